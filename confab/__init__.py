@@ -1,19 +1,13 @@
 """Confab: a robot planner whose knowledge lives in an ontology.
 
 ================  =========================================================================================
-`scenes()`        the shipped scenes' names
-`load(name)`      a `Scene`: a shipped name, a file of your own, or the URL of a SPARQL endpoint
-`scene.query(…)`  query the scene in SPARQL: a `Table`
-`scene.plan(…)`   plan in the scene: a `Result`
-`scene.verify(…)` execute a plan in physics: a `Report`
-`scene.execute(…)`  execute the task in a closed loop, with interventions: an `Execution`
-`Memory`          experience from planning and execution
-`practise(…)`     learn in scenes, and measure the benefit
-`new_domain(name)`  write a skeleton of a new domain
-`validate(file)`  the faults of an ontology file, with remedies
-`generate(…)`     a generated scene of any size
-`within(seconds)` a time limit for all calls in a block
-`KnowledgeError`  the given input can't be used; the message states the fault, its position, and the remedy
+`scenes()`        the shipped scenes' names `load(name)`      a `Scene`: a shipped name, a file of your own, or the URL of a
+SPARQL endpoint `scene.query(…)`  query the scene in SPARQL: a `Table` `scene.plan(…)`   plan in the scene: a `Result`
+`scene.verify(…)` execute a plan in physics: a `Report` `scene.execute(…)`  execute the task in a closed loop, with interventions:
+an `Execution` `Memory`          experience from planning and execution `practise(…)`     learn in scenes, and measure the benefit
+`new_domain(name)`  write a skeleton of a new domain `validate(file)`  list the faults of an ontology file, with remedies
+`generate(…)`     a generated scene of any size `within(seconds)` a time limit for all calls in a block `KnowledgeError`  the
+given input can't be used; the message states the fault, its position, and the remedy
 ================  =========================================================================================
 
 >>> import confab
@@ -79,7 +73,7 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> object:
-    """Import a public name on first access, so that the command line starts fast."""
+    """Import the module of a public name on first access, so that the command line starts fast."""
     if name not in _HOMES:
         if name.startswith("_"):
             raise AttributeError(f"module 'confab' has no attribute '{name}'")
@@ -100,11 +94,11 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    """Return the public names, for completion with the Tab key."""
+    """Return the public names, which a Python shell completes by the Tab key."""
     return [*__all__, "__doc__", "__version__"]
 
 
-if "IPython" in _sys.modules:  # notebooks show HTML for values of modules that contain no HTML
+if "IPython" in _sys.modules:  # registers the HTML that notebooks show for values whose modules contain no HTML
     from confab.page.notebook import register as _register
 
     _register()

@@ -29,8 +29,9 @@ class HasPlan(Protocol):
 AnyPlan: TypeAlias = "Plan | HasPlan | str | Path"
 """A plan, an object with a plan, or the path of a file that ``confab plan --json`` wrote."""
 Facts: TypeAlias = "str | Iterable[str | tuple[str, ...]] | Mapping[str, str] | Mapping[tuple[str, str], str] | None"
-"""One or several facts: a text like ``cup2 LOCATION location8``, several texts, the words of a fact, or a mapping of symbols to
-values."""
+"""One or several facts: a text like ``cup2 LOCATION location8``, several texts, a tuple of the words of a fact, or a mapping of
+symbols to values.
+"""
 
 
 class Stated(list[str]):
@@ -95,7 +96,7 @@ def plan_of(given: AnyPlan, problem: Problem) -> Plan:
 
 
 def check_goal(scene: str, problem: Problem) -> None:
-    """Raise `KnowledgeError` if a problem has no behaviour or no goal, or a goal whose value isn't in its situation type."""
+    """Raise `KnowledgeError` if a problem has no behaviour, has no goal, or has a goal whose value isn't in its situation type."""
     if not problem.domain.behaviors:
         raise KnowledgeError(f"{scene} has no behaviours, so that no plan is possible; import a domain with behaviours")
     if not problem.goal:
@@ -112,7 +113,7 @@ def check_goal(scene: str, problem: Problem) -> None:
 
 @contextmanager
 def possible() -> Iterator[None]:
-    """Raise `KnowledgeError` in place of an `ImpossibleStateError` from the code inside the ``with`` statement."""
+    """Turn an `ImpossibleStateError` of the code inside the ``with`` statement into a `KnowledgeError`."""
     try:
         yield
     except ImpossibleStateError as error:
@@ -120,7 +121,9 @@ def possible() -> Iterator[None]:
 
 
 def several(given: Facts) -> list[str]:
-    """Return facts as a list of texts. `given` is a text, several texts, the words of a fact, or a mapping of symbols to values.
+    """Return facts as a list of texts.
+
+    The argument `given` is a text, several texts, a tuple of the words of a fact, or a mapping of symbols to values.
 
     Raises
     ------
@@ -152,7 +155,7 @@ def several(given: Facts) -> list[str]:
 
 
 def number(name: str, given: object, wanted: str = "a number") -> None:
-    """Raise `KnowledgeError` if the argument of a parameter is neither a number nor None.
+    """Raise `KnowledgeError` unless the argument of a parameter is a number or None.
 
     Examples
     --------
@@ -166,7 +169,11 @@ def number(name: str, given: object, wanted: str = "a number") -> None:
 
 
 def shipped_queries(graph: KnowledgeGraph | None = None, episodes: bool = True) -> dict[str, str]:
-    """Return the shipped queries by name, without queries whose prefixes `graph` lacks and optionally without episode queries."""
+    """Return the shipped queries by name.
+
+    If `graph` is given, queries with prefixes that the graph lacks are left out; without `episodes`, queries about episodes are
+    left out.
+    """
     from confab.reasoner.graph.query_process import unknown_prefixes
 
     files = sorted((ontology.ROOT / "questions").glob("**/*.rq" if episodes else "*.rq"))
@@ -175,7 +182,7 @@ def shipped_queries(graph: KnowledgeGraph | None = None, episodes: bool = True) 
 
 
 def check_seconds(name: str, given: object) -> None:
-    """Raise `KnowledgeError` if a time limit is neither a positive number of seconds nor a `Deadline` nor None.
+    """Raise `KnowledgeError` unless a time limit is a positive number of seconds, a `Deadline` or None.
 
     Examples
     --------
@@ -191,7 +198,7 @@ def check_seconds(name: str, given: object) -> None:
 
 
 def sparql_of(given: str | Path, graph: KnowledgeGraph | None = None) -> str:
-    """Return the text of a SPARQL query, which is given as text, as a file, or by the name of a shipped query.
+    """Return the text of a SPARQL query that is given as a text, as a file, or by the name of a shipped query.
 
     Raises
     ------

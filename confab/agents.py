@@ -1,8 +1,8 @@
-"""An MCP server on stdio, whose tools plan, replan, query, validate, explain and verify for agents of language models.
+"""An MCP server on stdio. Its tools plan, replan, query, validate, explain and verify for agents that use a language model.
 
 Each call runs in a separate process. The process ends when the call or the server ends, at the time limit, or when the client
-cancels the call. An answer is text of at most `SHOWN` bytes. The last line of a cut answer names a resource with the complete
-text. The server reads files of one folder only. The only files that it writes are files of reach facts.
+cancels the call. An answer is text of at most `SHOWN` bytes. If an answer was cut, its last line names a resource that has the
+complete text. The server reads only files of one folder, and writes only files of reach facts.
 """
 
 from __future__ import annotations
@@ -25,10 +25,11 @@ if TYPE_CHECKING:
     from mcp.server.mcpserver import MCPServer
 
 SHOWN, KEPT = 4_000, 50
-"""Maximum number of bytes of an answer, and maximum number of complete texts of cut answers that the server keeps."""
+"""Maximum number of bytes of an answer, and maximum number of cut answers whose complete texts the server keeps."""
 MORE, MEGABYTES, MOST_SECONDS = 10.0, 6_000, 600.0
-"""Seconds by which a process may exceed its time limit, maximum memory of a process in megabytes, and greatest time limit in
-seconds."""
+"""Three limits of a process: the seconds by which it may exceed its time limit, its memory in megabytes, and its greatest time
+limit in seconds.
+"""
 
 SceneName = Annotated[
     str, Field(description="A shipped scene (tool scenes), or a file in the folder, e.g. kitchen.ttl")
@@ -43,14 +44,14 @@ Seconds = Annotated[float, Field(description="Time limit in seconds", gt=0, le=M
 
 
 class Kept:
-    """The complete texts of the latest `KEPT` answers that were cut, by number."""
+    """The complete texts of the last `KEPT` answers that were cut, by number."""
 
     def __init__(self) -> None:
         self._texts: dict[str, str] = {}
         self._count = 0
 
     def shown(self, text: str) -> str:
-        """Return an answer, or the beginning of a too long answer with the address of the complete text."""
+        """Return an answer; if the answer is too long, return its beginning and the address of the complete text."""
         if len(text.encode()) <= SHOWN:
             return text
         self._count += 1
@@ -65,7 +66,7 @@ class Kept:
         Raises
         ------
         KeyError
-            The answer was discarded, or never stored.
+            The answer was discarded, or was never stored.
         """
         return self._texts[number]
 
@@ -100,7 +101,7 @@ def server(folder: Path) -> MCPServer[Any]:
         raise KnowledgeError(f"{folder}: there is no such folder")
 
     class Server(MCPServer[Any]):
-        """The server of the SDK, with error messages about arguments in one sentence."""
+        """The server of the MCP SDK, with one-sentence error messages about wrong arguments."""
 
         async def call_tool(self, name: str, arguments: dict[str, Any], context: Any = None) -> Any:
             """Call a tool by name with arguments."""

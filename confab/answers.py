@@ -24,7 +24,7 @@ def inside(folder: Path, name: str) -> Path:
     Raises
     ------
     KnowledgeError
-        The file doesn't exist, or its name (a URL, an absolute path, ``..`` or a link) leads out of the folder.
+        The file doesn't exist, or isn't in the folder because its name is a URL, an absolute path, a path with ``..`` or a link.
     """
     path = (folder / name).resolve()
     if "://" in name or not path.is_relative_to(folder.resolve()):
@@ -43,7 +43,7 @@ def scene_of(folder: Path, name: str) -> Scene:
     Raises
     ------
     KnowledgeError
-        The file doesn't exist, or its name, a catalog or an import leads out of the folder.
+        The file doesn't exist, or its name, a catalog or an import refers to a file outside the folder.
     """
     from confab.reaching import with_current_reach
 
@@ -60,7 +60,7 @@ def scene_of(folder: Path, name: str) -> Scene:
         refuse_outside(catalog, catalog)
         for file in ontology.catalog(catalog).values():
             refuse_outside(catalog, file)
-    for file in sorted(path.parent.iterdir()):  # files that the scene may import by name
+    for file in sorted(path.parent.iterdir()):  # the scene may import these files by their names
         if file.suffix in ontology.SUFFIXES:
             refuse_outside(file, file)
     scene = load(path)
@@ -80,7 +80,7 @@ def scenes(folder: Path) -> str:
 
 
 def planned(scene: Scene, goals: Sequence[str], facts: Sequence[str], mode: Mode, seconds: float) -> Result:
-    """Plan in a scene after a replacement of facts, and return the result."""
+    """Plan in a scene in which `facts` replace the facts about the same symbols, and return the result."""
     return (scene.with_fact(*facts) if facts else scene).plan(
         list(goals), mode=mode, time_limit=seconds, engine=None if mode == "paper" else NO_ENGINE
     )
@@ -137,7 +137,7 @@ def why_not(folder: Path, name: str, goals: Sequence[str], instead: str, seconds
 
 
 def verify(folder: Path, name: str, goals: Sequence[str], rollouts: int, seed: int, seconds: float) -> str:
-    """Execute the plan in physics; return a summary, the primitives of one rollout with verdicts, and the success rate."""
+    """Execute the plan in physics. Return a summary, the primitives of one rollout with their verdicts, and the success rate."""
     if not 1 <= rollouts <= ROLLOUTS:
         raise KnowledgeError(f"got {rollouts} rollouts; wanted 1 to {ROLLOUTS}")
     with within(seconds):

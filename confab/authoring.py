@@ -35,20 +35,21 @@ CATALOG = """<?xml version="1.0" encoding="UTF-8" standalone="no"?>
 SPEAKS = "behavior does situationType relation termType ofClass first then refines isValueOf becomesValueOf"
 TERMS = [CORE + name for name in SPEAKS.split()]
 WORDS = [CORE + name for name in ("asks", "answer")]
-"""Properties whose values are texts that contain terms."""
+"""Properties whose values are texts with names of terms."""
 ROLES = [CORE + name for name in ARGUMENTS]
 
 
 def new_domain(name: str, folder: str | Path | None = None, bodies: bool = False) -> list[Path]:
     """Write a valid, commented skeleton of a domain with a scene and a catalog, and return the paths of its files.
 
-    By default the folder has the domain's name. With `bodies`, the skeleton also has a table, shapes and skills, which physics
-    needs to execute a plan. The catalog also lists the files of the shipped ontologies for Protégé.
+    By default the folder is named after the domain. With `bodies`, the skeleton also has a table, shapes and skills, so that a
+    plan can be executed in physics. The catalog also lists the files of the shipped ontologies, so that Protégé finds them.
 
     Raises
     ------
     KnowledgeError
-        The name contains characters other than letters, digits, ``_`` and ``-`` or doesn't begin with a letter, or a file exists.
+        A file of the skeleton exists already; or the name doesn't begin with a letter, or has characters other than letters,
+        digits, ``_`` and ``-``.
 
     Examples
     --------
@@ -118,7 +119,7 @@ def generate(
     Raises
     ------
     KnowledgeError
-        The family doesn't exist, there is no table for the number of objects or hands, or the path doesn't end in ``.ttl``.
+        The family doesn't exist, no table fits the number of objects or hands, or the path doesn't end in ``.ttl``.
 
     Examples
     --------
@@ -150,7 +151,7 @@ def turtle_path(given: str | Path) -> Path:
 
 @dataclass(frozen=True)
 class Difference:
-    """The difference between two versions of a scene: added and removed names by kind, and the lines of both plans."""
+    """The difference between two versions of a scene: the added and removed names by kind, and the lines of both plans."""
 
     gained: dict[str, tuple[str, ...]]
     lost: dict[str, tuple[str, ...]]
@@ -220,7 +221,9 @@ def _lines(scene: Scene, mode: Mode) -> tuple[str, ...]:
 
 
 def unknown_terms(memory: Lines, graph: KnowledgeGraph) -> list[str]:
-    """Return the domain's terms in a memory that a scene doesn't contain, each with the most similar name in the scene.
+    """Return the terms of the domain that a memory mentions and the scene doesn't contain.
+
+    Each term is mapped to the most similar name in the scene.
 
     The paper's links may name individuals of other scenes; these individuals don't count as terms of the domain.
     """
@@ -246,13 +249,13 @@ def unknown_terms(memory: Lines, graph: KnowledgeGraph) -> list[str]:
 def migrate(memory: Path, renames: Sequence[str]) -> int:
     """Rename terms in a memory file, and return the number of changed triples.
 
-    Each element of `renames` is ``OLD=NEW``, where OLD and NEW are IRIs or their last parts. A NEW that isn't an IRI gets the
-    namespace of OLD.
+    Each element of `renames` is ``OLD=NEW``, where OLD and NEW are IRIs or the last parts of IRIs. If NEW is only the last part
+    of an IRI, it gets the namespace of OLD.
 
     Raises
     ------
     KnowledgeError
-        The file is no memory, or OLD names no term or two terms of the memory.
+        The file isn't a memory, or OLD doesn't name exactly one term of the memory.
     """
     with alone(memory):
         quads, prefixes = _parse(memory)
@@ -283,7 +286,7 @@ def _rename(text: str, iris: set[str]) -> tuple[str, str]:
 
 
 def _renamed(quad: ox.Quad, table: dict[str, str], words: dict[str, str]) -> ox.Triple:
-    """Return a triple with its terms renamed in IRIs and in texts."""
+    """Return a triple in which terms have their new names, both in IRIs and in texts."""
     value: Any = quad.object
     if isinstance(value, ox.NamedNode):
         value = ox.NamedNode(table.get(value.value, value.value))

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 class Checked:
     """The verdict of the checker on a certificate of unsolvability.
 
-    `refused` is the reason why the certificate is no proof, or None for a proof that there is no plan. `claims` are the claims
-    of the proof as sentences.
+    `refused` is the reason why the certificate proves nothing; it is None if the certificate proves that there is no plan.
+    `claims` are the claims of the proof as sentences.
     """
 
     refused: str | None
@@ -52,7 +52,7 @@ def checked_certificate(scene: Scene, goals: tuple[str, ...], file: Path) -> Che
     goals : tuple of str
         Each goal replaces the scene's goal for the same symbol, as in planning.
     file : Path
-        The output of `confab plan --json` for an unsolvable task, or the certificate alone.
+        A file with the output of `confab plan --json` for an unsolvable task, or with the certificate alone.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Validation, in the whole scene, of a plan that was made in a part of the scene."""
+"""Validation of a plan in the whole scene, after the plan was made in a part of the scene."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from confab.reasoner.symbols import Symbol
 def refused(
     graph: KnowledgeGraph, slice_: Reading, plan: Plan, goals: Sequence[str] = (), unmet: Collection[Symbol] = ()
 ) -> list[Fault]:
-    """Return the faults that a plan made in a part of a scene has in the whole scene; the list is empty if the plan is valid.
+    """Return the faults in the whole scene of a plan that was made in a part of the scene. A valid plan has none.
 
-    The checker executes the plan with the individuals of the part. If conditions or effects depend on other individuals, these
-    individuals are read from the graph, and the check is repeated. The check doesn't use the code that selects the part of a
-    scene.
+    The checker first executes the plan with the individuals of the part. If conditions or effects depend on other individuals,
+    these individuals are read from the graph, and the check is repeated. The check doesn't use the code that selects the part of
+    a scene.
 
     Parameters
     ----------

@@ -1,9 +1,8 @@
 """The command line: a table of the commands, whose functions are in `confab/commands/`.
 
-Results go to stdout. Progress and errors go to stderr (`confab.terminal`). The exit codes are 0 for a positive answer,
-1 for a negative answer, 2 for misuse or unreadable input, 3 for a call that gave up at a limit, and 4 for a fault of
-the program. The module of a command is imported when the command is called. Slow imports are inside the functions that
-need them.
+Results go to stdout. Progress and errors go to stderr (`confab.terminal`). The exit code is 0 for a positive answer, 1 for a
+negative answer, 2 for a wrong call or unreadable input, 3 if a limit was reached, and 4 for a fault of the program. The module of
+a command is imported when the command is called. Slow imports are inside the functions that need them.
 """
 
 from __future__ import annotations
@@ -133,7 +132,7 @@ def app() -> None:
 def main(arguments: Sequence[str] | None = None, ending: Ending | None = None) -> NoReturn:
     """Run the command line, and end the process with an exit code and at most one line on stderr.
 
-    `ending` is called to end the process if a step continues long after its deadline. Without `ending`, no deadline ends the
-    process, so that another program can call `main`.
+    If a step continues long after its deadline, `ending` is called to end the process. Another program can call `main` without
+    `ending`; then no deadline ends the process.
     """
     run_to_end(lambda: app(arguments, prog_name="confab", standalone_mode=False, obj=ending))

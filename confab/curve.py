@@ -1,4 +1,4 @@
-"""Learning curves: the number of states that planning expands, episode by episode, while a memory grows."""
+"""Learning curves: the number of states that planning expands in each episode while a memory grows."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 KINDS = (".png", ".svg", ".pdf")
 MODES: dict[Mode, str] = {"guarded": "by default", "paper": "the paper's mode"}
 SECONDS = 20.0
-"""Time limit of a planning call in seconds. The picture has no data point for a call that exceeds the limit."""
+"""Time limit of a planning call in seconds. If a call exceeds the limit, the picture lacks its data point."""
 MANY = 12
 """Maximum number of episodes for which the picture shows names and counts."""
 
@@ -51,8 +51,8 @@ def practise(scenes: Scene | Sequence[Scene], memory: Memory, rounds: int = 1, c
 class Curve:
     """A learning curve: numbers of expanded states by mode and episode.
 
-    `with_memory` has the number of states that planning with the memory expands before each episode is learned.
-    `without` has the number of expanded states without memory. A value is None if planning found no plan.
+    For each episode, `with_memory` has the number of states that planning expands with the memory of the earlier episodes, and
+    `without` has the number without memory. A value is None if planning found no plan.
     """
 
     scenes: list[str] = field(default_factory=list)
@@ -122,7 +122,7 @@ class Curve:
 
 
 def require_drawable(path: Path) -> None:
-    """Raise `KnowledgeError` if the path's suffix is no supported picture format."""
+    """Raise `KnowledgeError` if the path's suffix isn't a supported picture format."""
     if path.suffix.lower() not in KINDS:
         raise KnowledgeError(f"{path}: can't draw into '{path.suffix}'; wanted {', '.join(KINDS)}")
 

@@ -1,8 +1,8 @@
 """Planning on one level by an external planner (an engine) through the library unified-planning.
 
-The level is exported to PDDL, and the engine's plan is read back. The result has the same form as a plan of Confab's own
-search. Each step is moved directly after the steps on which it depends. Consecutive steps with exactly the effect of a
-behaviour of a higher level become the refinement of that behaviour. Every plan of an engine is validated by
+The level is exported to PDDL, and the engine's plan is read back. The result has the same form as a plan of Confab's own search.
+Each step is moved directly after the steps on which it depends. If consecutive steps together have exactly the effect of a
+behaviour of a higher level, they become the refinement of that behaviour. Every plan of an engine is validated by
 `confab.planner.validation`.
 """
 
@@ -38,13 +38,13 @@ log = logging.getLogger(__name__)
 ENGINE_SECONDS = 60.0
 """Default time limit of a planning call by an engine in seconds."""
 IMPORTING = 1.0
-"""Seconds that the import of unified-planning can take; no engine is started if less time is left."""
+"""Seconds reserved for the import of unified-planning; if less time is left, no engine is started."""
 READING = 0.93
-"""Share of the remaining time that an engine may use. The rest of the time is for reading and validating the engine's plan."""
+"""Share of the remaining time that an engine may use. In the rest of the time, the engine's plan is read and validated."""
 WITHOUT_NUMBERS = {"up_fast_downward", "up_pyperplan", "up_symk", "up_test_cases"}
 """Packages of engines without support for numbers."""
 WITH_DEFINITIONS = {"up_fast_downward"}
-"""Packages of engines that support derived predicates, which unified-planning doesn't support."""
+"""Packages of engines that support derived predicates; unified-planning itself doesn't support derived predicates."""
 KNOWN = {
     "aries": "up-aries",
     "enhsp": "up-enhsp",
@@ -73,14 +73,18 @@ def plan_by_engine(
         problem.
     level : int, optional
     seconds : float, optional
-        Time limit of the whole call; by default `ENGINE_SECONDS`. A plan that the engine writes within the limit is used.
+        Time limit of the whole call; by default `ENGINE_SECONDS`. If the engine has written a plan at the limit, this plan is
+        used.
 
     Raises
     ------
     KnowledgeError
-        The engine or the level doesn't exist, or the engine doesn't support derived predicates or amounts that the problem has.
+        The engine or the level doesn't exist, or the problem has derived predicates or amounts and the engine doesn't support
+        them.
     """
-    with within(ENGINE_SECONDS if seconds is None else seconds) as deadline:  # includes export and imports
+    with within(
+        ENGINE_SECONDS if seconds is None else seconds
+    ) as deadline:  # the limit includes the export and the imports
         return _planned(problem, engine, level, deadline)
 
 
@@ -137,7 +141,7 @@ def unified(domain: str, problem: str) -> unified_planning.model.Problem:
 def some_installed(problem: Problem) -> bool:
     """Return whether unified-planning and an engine that supports a problem seem to be installed.
 
-    Only the names of the installed packages are read, since their import takes longer than most planning calls.
+    Only the names of the installed packages are read, since an import of the packages takes longer than most planning calls.
     """
     if find_spec("unified_planning") is None:
         return False
@@ -150,7 +154,7 @@ def some_installed(problem: Problem) -> bool:
 
 
 def at_rest(problem: Problem, level: int) -> dict[Symbol, str]:
-    """Return the initial values that a plan must restore: rest values of symbols that the first level doesn't see."""
+    """Return the initial values that a plan must restore: the rest values of symbols that the first level doesn't see."""
     first = problem.domain.levels[0]
     return {symbol: value for symbol, value in problem.at_rest(level).items() if first < problem.first_level(symbol)}
 
@@ -198,7 +202,7 @@ def answer(domain: str, problem: str, engine: str | None, deadline: Deadline) ->
 
 
 def solved(domain: str, problem: str, engine: str | None, seconds: float | None) -> Answer:
-    """Return the answer of unified-planning to a PDDL problem. The function runs in a process of `confab.reasoner.workers.call`."""
+    """Return the answer of unified-planning to a PDDL problem. `confab.reasoner.workers.call` runs this function in a process."""
     from unified_planning import environment as environments
     from unified_planning.environment import Environment
     from unified_planning.exceptions import UPException
@@ -227,7 +231,7 @@ def solved(domain: str, problem: str, engine: str | None, seconds: float | None)
         try:
             chosen = {"name": engine} if engine else {"problem_kind": task.kind}
             with factory.OneshotPlanner(**chosen) as planner:
-                planner.skip_checks = True  # some engines support action costs but declare that they don't
+                planner.skip_checks = True  # some engines declare that they don't support action costs, but do
                 result = planner.solve(task, timeout=seconds)
                 name = engine or planner.name
         except UPException as error:
@@ -246,7 +250,8 @@ def _tell(engine: str, deadline: Deadline) -> None:
 def _directly(planner: Any, domain: str, problem: str, deadline: Deadline) -> tuple[str, list[str]]:
     """Run an engine that reads PDDL on the exported files, and return the engine's status and the steps of the plan.
 
-    The files bypass unified-planning, whose reader takes minutes for large relations and doesn't support derived predicates.
+    The reader of unified-planning takes minutes for large relations and doesn't support derived predicates. The engine therefore
+    gets the files directly.
     """
     from unified_planning.model import Problem as Nothing
 
@@ -268,6 +273,6 @@ def _directly(planner: Any, domain: str, problem: str, deadline: Deadline) -> tu
         written = [file for file in Path(folder).iterdir() if re.fullmatch(r"plan(\.\d+)?", file.name)]
         for file in sorted(written, key=lambda file: file.stat().st_mtime_ns, reverse=True):
             text = file.read_text()
-            if code is not None or text.endswith("\n"):  # otherwise the engine was still writing the file
+            if code is not None or text.endswith("\n"):  # without it, the engine was still writing the file
                 return "SOLVED_SATISFICING", re.findall(r"^\(([^()]*)\)", text, re.MULTILINE)
         return "TIMEOUT" if code is None else planner._result_status(Nothing(), None, code, []).name, []

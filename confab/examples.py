@@ -1,4 +1,4 @@
-"""Examples in the help of each command. The examples of a command can be run in an empty folder, in their order."""
+"""Examples in the help of each command. A user can run the examples of a command in their order, in an empty folder."""
 
 from __future__ import annotations
 

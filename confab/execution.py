@@ -88,7 +88,7 @@ def parse_intervention(problem: Problem, text: str) -> Intervention:
         if match[1] == "at":
             when["at"] = _seconds(match[2])
         else:
-            # L1#2 names a step of the first level, whose path is (2,)
+            # L1#2 names a first-level step; its path is (2,)
             named = match[2].removeprefix(f"L{problem.domain.levels[0]}#")
             path = named.split(".") if named == match[2] else [named]
             when["after"] = int(match[2]) if match[2].isdigit() else tuple(map(_position, path))
@@ -155,7 +155,7 @@ def _known(problem: Problem, individual: str, text: str) -> str:
 
 
 def _placed(problem: Problem, individual: str, text: str, verb: str) -> str:
-    """Return the name of an object; raise `KnowledgeError` if no fact states the place of an object to be knocked or pushed."""
+    """Return the name of an object that is to be knocked over or pushed; raise `KnowledgeError` if no fact states its place."""
     _known(problem, individual, text)
     if verb != "remove" and not any(symbol in problem.initial for symbol in place_symbols(problem, individual)):
         raise KnowledgeError(f"'{text}': {individual} is no object that stands at a place which physics perceives")
@@ -163,7 +163,10 @@ def _placed(problem: Problem, individual: str, text: str, verb: str) -> str:
 
 
 def _push(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -> Intervention:
-    """Return the push of an object, read from ``OBJECT X Y`` (in centimetres away from the robot and to the robot's left)."""
+    """Return the push of an object, read from ``OBJECT X Y``.
+
+    X is the distance in centimetres away from the robot, and Y the distance to the robot's left.
+    """
     try:
         individual, *by = words
         numbers = tuple(float(number) / 100 for number in by)
@@ -177,7 +180,10 @@ def _push(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -
 
 
 def _box(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -> Intervention:
-    """Return the intervention that puts a box without facts at a place, read from ``PLACE [WIDTHxDEPTHxHEIGHT]`` in centimetres."""
+    """Return the intervention that puts a box at a place, read from ``PLACE [WIDTHxDEPTHxHEIGHT]`` in centimetres.
+
+    The scene has no facts about the box.
+    """
     place, size = (*words, "6x6x12")[:2] if words else ("", "")
     try:
         numbers = tuple(float(number) / 100 for number in size.split("x"))
@@ -353,7 +359,7 @@ class Execution(metaclass=RightNames):
         )
 
     def graph(self) -> networkx.DiGraph[int]:
-        """Return the partial order of the executed primitives; an edge leads to a primitive that depends on the edge's start."""
+        """Return the partial order of the executed primitives. An edge leads from a primitive to a primitive that depends on it."""
         from confab.planner.acting.schedule import partial_order
 
         problem = replace(self.scene.problem, initial=self.episode.initial)
@@ -452,16 +458,16 @@ def carry_out(
 
 
 def _whole_problem(scene: Known, plan: AnyPlan | None, goals: Sequence[str]) -> Problem:
-    """Return the problem of the whole scene with the given goals or, if `plan` is a result, with the goals of the result.
+    """Return the problem of the whole scene. It has the given goals or, if `plan` is a result, the goals of the result.
 
-    The part of the scene that suffices for the first plan may not suffice for plans that are made during execution.
+    The part of the scene from which the first plan was made may not suffice for plans that are made during execution.
     """
     whole = getattr(plan, "in_whole_scene", None)
     return with_goals(scene.reading.problem, goals) if whole is None else whole().problem
 
 
 def planner_of(mode: Mode, memory: Links | None = None) -> Planner | None:
-    """Return the planner of a mode for new plans during execution, or None for the default planner.
+    """Return the planner that makes new plans during execution in a mode, or None for the default planner.
 
     Raises
     ------
@@ -514,12 +520,12 @@ def execute(
     seed : int
         Seed of all random numbers in physics.
     observer : callable, optional
-        Called with every event.
+        A function that is called with every event.
     prepare : callable, optional
-        Called with the PyBullet world before the execution, for instance to inject a fault.
+        A function that is called with the PyBullet world before the execution, for instance to inject a fault.
     retry_policy : RetryPolicy
     caution : Caution, optional
-        Knowledge from failures in earlier episodes.
+        What is known from failures in earlier episodes.
     perturb : bool
         Vary poses, friction, masses and filled amounts in PyBullet at random, with `seed`.
     noise : float
@@ -597,7 +603,7 @@ def _with_both_hands(
     observer: Callable[[Event], None] | None,
     caution: Caution | None,
 ) -> Episode:
-    """Execute a plan with all hands at once until it ends or fails, and reach the goals that remain in a closed loop."""
+    """Execute a plan with all hands at once until it ends or fails; then reach the remaining goals in a closed loop."""
     from confab.planner.acting.episode import ExecutedPrimitive, Failure
     from confab.planner.hierarchical.planner import plan as hierarchical_plan
     from confab.sim.together import perform_together
@@ -634,6 +640,6 @@ def _with_both_hands(
 
 
 def _only(steps: Iterable[Step], paths: set[tuple[int, ...]]) -> tuple[Step, ...]:
-    """Return the trees of steps, reduced to the primitives at the given paths and the steps above these primitives."""
+    """Return the trees of steps with only the primitives at the given paths, and the steps above these primitives."""
     kept = [replace(step, steps=_only(step.steps, paths)) if step.steps else step for step in steps]
     return tuple(step for step in kept if step.steps or step.path in paths)

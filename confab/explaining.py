@@ -1,4 +1,4 @@
-"""Explanation of a memory's preference for a behaviour: a learned rule, the rule's episodes, and the summands of the cogency."""
+"""Explanation of why a memory prefers a behaviour: the learned rule, the rule's episodes, and the summands of the cogency."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SHOWN = 8
 
 @dataclass(frozen=True)
 class Why:
-    """A fact with its values for the chosen behaviour and the alternative, and its weight in favour of the chosen behaviour."""
+    """A fact with its values for the chosen behaviour and the alternative, and its weight for the chosen behaviour."""
 
     fact: str
     chosen: str
@@ -44,9 +44,9 @@ class Why:
 class Explanation:
     """An explanation of the preference for the behaviour `chosen` over the behaviour `other`.
 
-    Each of the `reasons` has a weight, which is a difference of natural log odds. `lead` is the sum of the weights.
-    `rule` is the learned rule as a sentence, and `behind` names the episodes with the rule. `note` is a remark if
-    memory has no advice.
+    Each of the `reasons` has a weight, which is a difference of natural log odds. `lead` is the sum of the weights. `rule` is the
+    learned rule as a sentence, and `behind` tells from which episodes the rule comes. If memory has no advice, `note` is a remark
+    on this.
     """
 
     chosen: str
@@ -90,7 +90,10 @@ class Explanation:
         return "\n".join([*lines, *([f"  ({self.note})"] if self.note else [])])
 
     def plot(self, path: str | Path | None = None) -> Figure:
-        """Draw the weights for (right) and against (left) the chosen behaviour as bars, and save the chart if a file is given."""
+        """Draw the weights as bars, and save the chart if a file is given.
+
+        Weights for the chosen behaviour go to the right, weights against it to the left.
+        """
         from confab.picturing import save, words_as_they_are
 
         with words_as_they_are():
@@ -124,7 +127,7 @@ def explain(
     against: Ground | None = None,
     labels: Labels | None = None,
 ) -> Explanation:
-    """Explain by memory why a step of a plan is preferred to an alternative.
+    """Explain why memory prefers a step of a plan to an alternative.
 
     Parameters
     ----------
@@ -135,9 +138,9 @@ def explain(
     number : int
         The index in `steps` of the step to be explained.
     against : behaviour and arguments, optional
-        The alternative; by default the most cogent other behaviour that the rules advise in the same state.
+        The alternative; by default, of the other behaviours that the rules advise in the same state, the most cogent one.
     labels : Labels, optional
-        The labels by which the text names individuals.
+        The labels that the text uses for individuals.
 
     Raises
     ------
@@ -212,7 +215,7 @@ def _best(alternatives: Sequence[RuleInstance], advisor: Advisor, reader: FactRe
 def _differences(
     chosen: RuleInstance, other: RuleInstance, advisor: Advisor, reader: FactReader, say: Sayings
 ) -> tuple[Why, ...]:
-    """Return the differences between the summands of two cogencies, the greatest difference first."""
+    """Return the differences between the cogencies of two rule instances, summand by summand, the greatest difference first."""
     facts: list[dict[str, tuple[Fact, float]]] = []
     for c in (chosen, other):
         factors = advisor.scorer.factors(c.rule, reader.facts(c.rule, c.roles), reader.individuals(c.rule, c.roles))

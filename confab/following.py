@@ -1,4 +1,4 @@
-"""Derivation of the defined situation types (derived predicates), sums and counts that a query names, in the initial state."""
+"""Derivation of the facts that a query needs: initial values of defined situation types (derived predicates), sums and counts."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ ASK {
     UNION { ?property owl:propertyChainAxiom|owl:equivalentProperty|owl:inverseOf ?other }
     UNION { ?atom <http://www.w3.org/2003/11/swrl#propertyPredicate> ?property } }
 }"""
-"""Query that asks whether a scene has definitions. A scene without definitions needn't be read as a problem before a query."""
+"""Query that asks whether a scene has definitions. If it has none, it needn't be read as a problem before a query."""
 
 
 def write_following(graph: KnowledgeGraph, read: Callable[[], Reading], sparql: str) -> None:
@@ -59,7 +59,7 @@ def write_following(graph: KnowledgeGraph, read: Callable[[], Reading], sparql: 
 
 
 def _following(problem: Problem, situations: Collection[str]) -> Iterator[Symbol]:
-    """Yield the symbols of given defined situation types that are true in the initial state."""
+    """Yield, for some defined situation types, the symbols that are true in the initial state."""
     if not situations:
         return
     table = Table(problem.domain.situations, problem.initial)

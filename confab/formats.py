@@ -18,9 +18,9 @@ class _Step(TypedDict):
 
 
 class StepJson(_Step, total=False):
-    """A step with its sub-steps, and in paper mode its cogency rank `rank`.
+    """A step with its sub-steps; in paper mode, `rank` is the rank of its cogency.
 
-    `joined` are further steps that the sub-steps refine together with this step.
+    If the sub-steps refine further steps together with this step, `joined` has these steps.
     """
 
     rank: float
@@ -50,8 +50,9 @@ class BrokenJson(TypedDict):
 
 
 LeftJson = TypedDict("LeftJson", {"level": int, "from": list[int], "to": list[int], "breaks": list[BrokenJson]})
-"""A part of a plan, between two paths, that has no steps of a level. `breaks` has the conditions of this level that the part
-violates."""
+"""A part of a plan, between two paths, that has no steps of one level. `breaks` has the conditions of this level that the part
+violates.
+"""
 
 
 class CacheJson(TypedDict):
@@ -106,9 +107,9 @@ class _Outcome(TypedDict):
 
 
 class OutcomeJson(_Outcome, total=False):
-    """The result of planning. A solved task has the steps and the length of a plan.
+    """The result of planning. For a solved task, it has the steps and the length of a plan.
 
-    An unsolved task has a reason. An unsolvable task may also have a certificate.
+    For an unsolved task, it has the reason, and possibly a certificate that the task is unsolvable.
     """
 
     length: dict[str, int]

@@ -15,13 +15,16 @@ if TYPE_CHECKING:
     from confab.labels import Labels
 
 TALL, LINES = 21, 2.8
-"""Maximum number of characters in a line of a bar's text, and number of text lines per second of a bar's duration."""
+"""Maximum number of characters in a line of text on a bar, and number of lines that fit on a bar per second of its duration."""
 
 
 def save_gantt(
     slots: Sequence[Slot], path: str | Path, serial: float | None = None, labels: Labels | None = None
 ) -> Path:
-    """Draw a schedule as a Gantt chart into a picture file, with the serial duration `serial` if given; return the path."""
+    """Draw a schedule as a Gantt chart into a picture file, and return the path.
+
+    If given, the serial duration `serial` is shown, too.
+    """
     from confab.picturing import save, words_as_they_are
 
     with words_as_they_are():

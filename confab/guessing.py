@@ -1,9 +1,9 @@
 """Suggestions of the right name for a wrong name.
 
-Each kind of object has a table of wrong names (`confab.hints`), in which first the whole wrong name is looked up, then
-its words. Words that the table doesn't have are compared with the public names and their descriptions. Words with the
-same meaning are equal. The candidates are first the names of the object itself, then the names of objects in its
-attributes (``result.outcome.search``), then all other names (``scene.with_fact``).
+Each kind of object has a table of wrong names (`confab.hints`). First the whole wrong name is looked up in this table, then the
+words of the name. Words that the table doesn't have are compared with the public names and their descriptions. Words with the
+same meaning count as equal. The candidates are first the names of the object itself, then the names of objects in its attributes
+(``result.outcome.search``), then all other names (``scene.with_fact``).
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ WAYS: Mapping[str, Mapping[str, str]] = {
     "entry": {"verdict": "verdict"},
     "fact": {"symbol": "symbol"},
 }
-"""The attribute or the call that leads from an object to another object, by the kinds of the two objects."""
+"""The attribute or the call that leads from an object to another object, indexed by the kinds of the two objects."""
 MEANINGS = """
 load open read parse import file ontology problem domain scene ttl turtle owl rdf make world env gym
 scenes examples datasets catalog list available builtin samples
@@ -159,7 +159,7 @@ OF_ANY = frozenset({"plan", "planning", "search"})
 OF_MODULE = frozenset({"scene", "ontology", "file"})
 """Words that are ignored in names of the module `confab` if a name has other words."""
 ENOUGH, FAR = 0.7, 0.1
-"""Minimum score of a suggested name, and reduction of the score for each attribute or call that leads to the name."""
+"""Minimum score of a suggested name, and the amount by which each attribute or call on the way to the name reduces the score."""
 MOST, NEAR = 3, 0.3
 """Maximum number of suggested names, and maximum difference of their scores from the best score."""
 
@@ -172,7 +172,7 @@ def stem(word: str) -> str:
 
 @cache
 def meanings() -> Mapping[str, frozenset[int]]:
-    """Return the numbers of the lines of `MEANINGS` that contain a word, by the stem of the word."""
+    """Return a mapping of the stem of each word to the numbers of the lines of `MEANINGS` that contain the word."""
     lines = [[*map(stem, line.split())] for line in MEANINGS.strip().splitlines()]
     words = {word for line in lines for word in line}
     return {word: frozenset(i for i, line in enumerate(lines) if word in line) for word in words}
@@ -203,7 +203,7 @@ def segments(run: str) -> tuple[str, ...]:
 
 
 def parted(name: str) -> str:
-    """Return a name in small letters with underscores between its words, for example ``get_plan`` for ``getPlan``."""
+    """Return a name in lower case with underscores between its words, for example ``get_plan`` for ``getPlan``."""
     return re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", name).lower()
 
 
@@ -219,7 +219,10 @@ def described(kind: str) -> Mapping[str, str]:
     """Return the public names of a class, or of the module `confab`, each with the first line of its docstring."""
     if kind == "confab":
         module = import_module("confab")
-        names = ["Memory", *(n for n in module.__all__ if n.islower())]  # users call the constructor of no other class
+        names = [
+            "Memory",
+            *(n for n in module.__all__ if n.islower()),
+        ]  # `Memory` is the only class whose constructor users call
         return {**{n: (getattr(module, n).__doc__ or "").split("\n")[0] for n in names}, "__version__": ""}
     home, _, name = CLASSES[kind].rpartition(".")
     cls = getattr(import_module(home), name)
@@ -245,7 +248,7 @@ def places(kind: str) -> Iterator[tuple[str, str, int]]:
 
 
 def score(wanted: tuple[str, ...], name: str, doc: str) -> float:
-    """Return how well a name and its docstring match the wanted words; 1 is the maximum."""
+    """Return a score of how well a name and its docstring match the wanted words; 1 is the maximum."""
     has, said = words_of(name), set(re.findall(r"[a-z]+", doc.lower()))
     met = [max(alike(word, one) for one in has) for word in wanted]
     told = [
@@ -259,15 +262,15 @@ def score(wanted: tuple[str, ...], name: str, doc: str) -> float:
 TYPED = 0.85
 """Minimum similarity to a known name for a wrong name to be treated as a typing error."""
 PART = 0.6
-"""Score of a word that occurs in a table's entry only as a part of longer names."""
+"""Score of a word that a table's entry has only as a part of longer names."""
 OWN = 0.1
-"""Additional value of a word that is the name that an entry suggests."""
+"""Bonus for a word that is itself the name suggested by an entry."""
 UNKNOWN = 0.4
-"""Weight of a word that no entry of a table has."""
+"""Weight of a word that occurs in no entry of a table."""
 HALF = 0.75
-"""Factor for an entry that has the words of a wrong name only in longer names."""
+"""Factor for an entry in which the words of a wrong name occur only in longer names."""
 KNOWN_WORDS = 0.4
-"""Minimum share of the words of a wrong name that an entry of a table must have; rare words weigh more."""
+"""An entry of a table must have at least this share of the words of a wrong name; rare words weigh more."""
 
 
 def whole(table: Mapping[str, str], name: str) -> str:
@@ -280,9 +283,9 @@ def whole(table: Mapping[str, str], name: str) -> str:
 
 
 def by_words(table: Mapping[str, str], wanted: tuple[str, ...], least: float = KNOWN_WORDS) -> str:
-    """Return the key of the table's entry (a key with its values) that contains the most of some wanted words.
+    """Return the key of the entry of a table that contains the most of the wanted words.
 
-    The weight of a word is greater if fewer entries have it. The result is empty if no entry has enough of the words.
+    The weight of a word is greater if fewer entries have it. If no entry has enough of the words, an empty text is returned.
 
     >>> by_words({"with_fact": "add set", "with_goal": "add", "facts": "state"}, ("add", "goal"))
     'with_goal'
@@ -308,9 +311,9 @@ def by_words(table: Mapping[str, str], wanted: tuple[str, ...], least: float = K
 
 
 def guessed(kind: str, name: str, known: Iterable[str] = ()) -> str:
-    """Return the names that a wrong name of a kind of object may mean, the most likely name first, as text.
+    """Return, as text, the names that a user may mean by a wrong name, the most likely name first.
 
-    The result is empty if the wrong name is a typing error of a known name.
+    If the wrong name is a known name with a typing error, an empty text is returned.
 
     >>> guessed("result", "planning_time"), guessed("result", "slove"), guessed("plan", "xyzzy")
     ('seconds', '', '')
@@ -330,7 +333,7 @@ def guessed(kind: str, name: str, known: Iterable[str] = ()) -> str:
 
 
 def _described_as(kind: str, name: str) -> str:
-    """Return the names whose words and descriptions have the meaning of a wrong name, as text."""
+    """Return, as text, the names whose words and descriptions have the meaning of a wrong name."""
     wanted = words_of(name)
     aside = OF_MODULE if kind == "confab" else OF_ANY
     wanted = tuple(word for word in wanted if alike(word, kind) < 1 and word not in aside) or wanted

@@ -1,7 +1,7 @@
-"""Names under which users of other libraries look for functions of Confab, and the names of these functions.
+"""Names that users of other libraries may try, and the functions of Confab that these users mean.
 
-Each table belongs to a kind of object. A key is an expression of Confab; the value contains other names with the
-meaning of the expression. `confab.guessing` compares whole names first, then the words of the names.
+Each table belongs to a kind of object. A key is an expression of Confab; the value contains other names with the same meaning.
+`confab.guessing` compares whole names first, then the words of the names.
 """
 
 from __future__ import annotations
@@ -629,7 +629,7 @@ COMMANDS = {
     "plan --memory FILE": "use-memory plan-with-memory",
     "python -c 'import confab'": "shell repl console ipython python interactive-shell",
 }
-"""Names of commands, and other words for each command."""
+"""The names of the commands, each with other words for it."""
 OPTIONS = {
     "time_limit seconds": "timeout max_time deadline limit time max_seconds time_out budget t duration "
     "max_planning_time overall_time_limit search_time_limit max_runtime wall_time seconds sec timelimit",
@@ -698,8 +698,8 @@ OPTIONS = {
     "behavior": "action operator skill behaviour name",
     "from_observed": "initial_state input start",
 }
-"""Names of parameters in Python, and other words for each parameter. The option of a parameter has the parameter's
-name, with ``--`` before the name and ``-`` in place of ``_``.
+"""The names of the parameters in Python, each with other words for it. The option of a parameter has the parameter's name, with
+``--`` before the name and ``-`` in place of ``_``.
 
-If a key contains several names, the first name that the function or command has is used.
+If a key contains several names, the first one that the called function or command accepts is suggested.
 """

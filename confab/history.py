@@ -24,7 +24,7 @@ RECORD = "run.json"
 
 @dataclass(frozen=True)
 class Run:
-    """A stored run: the name of its folder, its date, its options, the content of memory as text, and the data of its page.
+    """A stored run: the name of its folder, its date, its options, the content of the memory as text, and the data of its page.
 
     Examples
     --------
@@ -50,7 +50,7 @@ class Run:
 
 
 def record(folder: Path, page: PageData, how: Mapping[str, object], memory: str) -> Path:
-    """Write the record of a run, without the film, into the run's folder, and return the path of the record."""
+    """Write the record of a run into the run's folder, without the film, and return the path of the record."""
     shown = {key: value for key, value in page.items() if key != "film"}
     when = datetime.now().astimezone().isoformat(timespec="seconds")
     data = {"run": folder.resolve().name, "when": when, "how": dict(how), "memory": memory, "page": shown}
@@ -59,7 +59,7 @@ def record(folder: Path, page: PageData, how: Mapping[str, object], memory: str)
 
 
 def new_folder(runs: Path) -> Path:
-    """Create a folder for the next run in `runs` (001, or the greatest number plus one), and return its path."""
+    """Create a folder for the next run in `runs`, and return its path. Folders are numbered from 001."""
     made_folder(runs)
     last = max((int(one.name) for one in runs.iterdir() if one.name.isdecimal() and one.name.isascii()), default=0)
     while True:

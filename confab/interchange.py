@@ -25,7 +25,7 @@ def step_json(step: Step) -> StepJson:
 
 
 def outcome_json(scene: str, outcome: Outcome, seconds: Mapping[str, float]) -> OutcomeJson:
-    """Return the outcome of a planning call as JSON data. `seconds` has the durations of the stages before the search."""
+    """Return the outcome of a planning call as JSON data. The durations of the stages before the search are in `seconds`."""
     data: OutcomeJson = {
         "scene": scene,
         "status": outcome.status.value,
@@ -106,7 +106,7 @@ def read_certificate(path: Path) -> Certificate:
 
 
 def _json(path: Path, what: str) -> Any:
-    """Return the content of a JSON file. The text `what` names the expected content (a plan or a certificate) in error messages."""
+    """Return the content of a JSON file. In error messages, `what` names the expected content: a plan or a certificate."""
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -146,12 +146,12 @@ def check_arguments(problem: Problem, behavior: Behavior, arguments: tuple[str, 
 
 
 def step_from(data: Any, position: tuple[int, ...], path: Path, problem: Problem) -> Step:
-    """Return a step with its sub-steps from JSON data at a position in the tree of a plan.
+    """Return the step, with its sub-steps, that JSON data describe; `position` is the step's position in the plan's tree.
 
     Raises
     ------
     KnowledgeError
-        The data are no step, or mention terms that the scene doesn't have. The message states the position.
+        The data don't describe a step, or mention terms that the scene doesn't have. The message states the position.
     """
     where = f"{path}: step {'.'.join(map(str, position))}"
     if not isinstance(data, dict) or not isinstance(data.get("behavior"), str):

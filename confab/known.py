@@ -54,7 +54,7 @@ class Known(metaclass=RightNames):
     knowledge: KnowledgeGraph
 
     def __post_init__(self) -> None:
-        """Raise `TypeError` if the argument is no knowledge graph, for instance the name of a scene."""
+        """Raise `TypeError` if the argument isn't a knowledge graph but, for instance, the name of a scene."""
         if not isinstance(self.knowledge, KnowledgeGraph):
             raise TypeError(
                 f"a scene is made of a knowledge graph; got {self.knowledge!r}: use confab.load({self.knowledge!r})"
@@ -67,12 +67,12 @@ class Known(metaclass=RightNames):
     _told: bool = field(default=False, init=False, repr=False, compare=False)
 
     def __getstate__(self) -> dict[str, object]:
-        """Return the state for pickling and copying. Cached values are left out, and are later read from the graph again."""
+        """Return the state for pickling and copying. It has no cached values; the copy reads them from the graph again."""
         self.settle()
         return {"knowledge": self.knowledge, "seconds": self.seconds, "_edited": False, "_told": self._told}
 
     def __getitem__(self, name: object) -> NoReturn:
-        """Raise `TypeError`, whose message names the properties to use. Iteration and ``in`` also call this method."""
+        """Raise a `TypeError` whose message names the properties to use. Python also calls this method for iteration and ``in``."""
         raise TypeError("a scene has no items; use objects, facts, goals or behaviors")
 
     @cached_property
@@ -182,7 +182,7 @@ class Known(metaclass=RightNames):
         return Stated(sorted(str(Fact(symbol, value)) for symbol, value in self.problem.goal.items()))
 
     def with_fact(self: S, *facts: Facts) -> S:
-        """Return a copy of the scene with some facts replaced. Write a fact as one text or as a tuple of its words.
+        """Return a copy of the scene with some facts replaced. A fact is given as one text, or as a tuple of its words.
 
         Raises
         ------
@@ -200,7 +200,7 @@ class Known(metaclass=RightNames):
         return self._restated(with_facts, facts)
 
     def with_goal(self: S, *goals: Facts) -> S:
-        """Return a copy of the scene with some goals replaced. Write a goal as one text or as a tuple of its words.
+        """Return a copy of the scene with some goals replaced. A goal is given as one text, or as a tuple of its words.
 
         Raises
         ------
@@ -242,7 +242,7 @@ class Known(metaclass=RightNames):
         Raises
         ------
         KnowledgeError
-            The scene is declared to have no geometry.
+            The scene states that it has no geometry.
         EmbodimentError
             A statement that physics needs is missing. The message names the statement.
         """
@@ -284,8 +284,8 @@ class Known(metaclass=RightNames):
     def query(self, sparql: str | Path, limits: QueryLimits | None = None) -> Table:
         """Return the result of a SPARQL 1.1 query (SELECT, ASK or CONSTRUCT) as a table.
 
-        The query is given as text, as a ``.rq`` file, or by the name of a shipped query (``ontology/questions``). The graph
-        has stated and inferred facts; default values are only in `facts`.
+        The query is given as text, as a ``.rq`` file, or by the name of a shipped query (``ontology/questions``). The graph has
+        stated and inferred facts. Default values aren't in the graph, but only in the property `facts`.
 
         A query can use the prefixes of the scene's file and of its imports. If two files declare a prefix, the scene's file has
         precedence. ``:name`` denotes a term of the core ontology if the scene's namespace has no such name. If the answer is
@@ -336,7 +336,10 @@ class Known(metaclass=RightNames):
         return self
 
     def _asked(self, sparql: str, limits: QueryLimits | None) -> KnowledgeGraph:
-        """Return the graph for a query, with the derived facts that the query names; missing imports are reported once."""
+        """Return the graph for a query, with the derived facts that the query names.
+
+        If imports are missing, a warning is given once.
+        """
         from confab.following import write_following
         from confab.reasoner.graph.query_process import QueryLimits
         from confab.reasoner.reading.affordance import SITUATION, write_situation
@@ -362,12 +365,14 @@ class Known(metaclass=RightNames):
     def construct(
         self, sparql: str, path: str | Path | None = None, limits: QueryLimits | None = None
     ) -> rdflib.Graph | int:
-        """Return the triples of a CONSTRUCT query, or write them into a file that imports this scene and return their number.
+        """Return the triples of a CONSTRUCT query.
+
+        If a path is given, write them into a file that imports this scene, and return their number.
 
         Raises
         ------
         KnowledgeError, LimitError
-            The query fails as described in `query`, or is no CONSTRUCT query.
+            The query fails as described in `query`, or isn't a CONSTRUCT query.
         """
         sparql = sparql_of(sparql, self.knowledge)
         if path is not None:
@@ -415,12 +420,12 @@ class Known(metaclass=RightNames):
         return standing_alone(self.knowledge, query_for(self.reading, behavior_named(self.reading, behavior)))
 
     def affordances(self, of: str | None = None) -> Table:
-        """Return a table of the behaviours that objects afford in the initial state.
+        """Return a table of the behaviours that an object affords in the initial state; ``all`` or None stands for all objects.
 
         Raises
         ------
         KnowledgeError
-            The object doesn't exist. The names ``all`` and None denote all objects.
+            The object doesn't exist.
         """
         from confab.reasoner.reading.affordance import affordances
 

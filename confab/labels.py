@@ -26,7 +26,7 @@ NAMED = re.compile(
     rf"|(?P<of>\w+) of (?P<about>{WORD}(?:, {WORD})*): "
     rf"|(?P<words>{WORD}(?: {WORD})*)"
 )
-"""Pattern of a symbol with a value, of a symbol before a colon, or of words that may contain facts."""
+"""Pattern that finds symbols with a value, symbols before a colon, and words that may contain facts."""
 AT_ONCE = 400
 """Maximum number of terms in one query for labels."""
 
@@ -102,7 +102,7 @@ class Labels:
         return " ".join(said)
 
     def placed(self, name: str) -> str:
-        """Return the label of an individual as a noun: the label "in the box" becomes "the place in the box"."""
+        """Return the label of an individual as a noun phrase: the label "in the box" becomes "the place in the box"."""
         label = self.name(name)
         first, *more = label.split(" ")
         return f"the place {label}" if first in PLACING and more and more[-1] not in WAYS | {"of"} else label
@@ -130,7 +130,7 @@ class Labels:
         return self.behavior(behavior, terms)
 
     def behavior(self, behavior: Behavior, terms: Mapping[str, str]) -> str:
-        """Return a behaviour as a sentence, with `terms` (individuals, for example) in place of some of its roles."""
+        """Return a behaviour as a sentence, in which `terms` (for example individuals) replace some of its roles."""
         label = self.words.get(behavior.name)
         if label is None:
             return " ".join((behavior.name, *(self.name(terms.get(p.name, p.name)) for p in behavior.parameters)))
@@ -155,7 +155,7 @@ WAYS = {*PLACING, "from", "into", "onto", "with", "by", "off", "over", "behind",
 
 
 def _mention(role: str, label: str, terms: Iterable[str]) -> re.Pattern[str] | None:
-    """Return a pattern of the words for a role in a label, or None; a role named "onto" is denoted by the words after "onto"."""
+    """Return a pattern of the words for a role in a label, or None. For a role named "onto", these are the words after "onto"."""
     name = role.lstrip("?")
     if name.lower() in WAYS:
         others = "|".join(re.escape(term.lstrip("?")) for term in terms)
@@ -166,7 +166,7 @@ def _mention(role: str, label: str, terms: Iterable[str]) -> re.Pattern[str] | N
 
 
 def _chosen(verb: str, value: str) -> str:
-    """Return the label of a property; if the label lists the possible values, only the given value remains.
+    """Return the label of a property. If the label lists the possible values, only the given value is kept.
 
     >>> _chosen("is tied up or loose", "loose"), _chosen("is clean or dirty", "clean"), _chosen("is at", "cup 1")
     ('is loose', 'is clean', 'is at')
@@ -202,7 +202,7 @@ def labels_of(knowledge: KnowledgeGraph, names: Names, problem: Problem, others:
         The IRIs of the names.
     problem : Problem
     others : iterable of str
-        Further names with labels that are not in the problem, for instance of furniture.
+        Further names whose labels are wanted, for instance of furniture, which isn't in the problem.
     """
     domain = problem.domain
     spoken = {*domain.behaviors, *domain.situations, *problem.classes, *problem.relations}
@@ -218,7 +218,7 @@ def labels_of(knowledge: KnowledgeGraph, names: Names, problem: Problem, others:
 
 
 def _read(knowledge: KnowledgeGraph, iris: Sequence[str]) -> dict[str, str]:
-    """Return the labels of IRIs, where English labels are preferred, followed by labels without a language."""
+    """Return the labels of IRIs. English labels are preferred; the second choice are labels without a language."""
     found: dict[str, tuple[int, str]] = {}
     for start in range(0, len(iris), AT_ONCE):
         those = " ".join(f"<{iri}>" for iri in iris[start : start + AT_ONCE])

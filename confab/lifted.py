@@ -1,4 +1,4 @@
-"""Sentences about learned experience: rules, orders of goals, methods, kinds of goals, and facts counted for cogency."""
+"""Sentences about learned experience: rules, orders of goals, methods, kinds of goals, and the facts that cogency counts."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ ASKED = (
 
 
 class Sayings:
-    """Writer of sentences about learned experience, which uses labels if available and otherwise the ontology's names.
+    """Writer of sentences about learned experience. It uses labels if they are available, and otherwise the ontology's names.
 
     Parameters
     ----------

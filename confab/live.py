@@ -20,7 +20,7 @@ LOG = 6
 
 @dataclass(repr=False)
 class View:
-    """A view that shows the plan at the last event and a log of recent events."""
+    """A view that shows the plan as of the last event, and a log of recent events."""
 
     event: Event | None = None
     log: list[str] = field(default_factory=list)
@@ -40,7 +40,7 @@ class View:
             self.log.append(f"≠ {surprise.symbol}: expected {surprise.expected}, observed {surprise.observed}")
 
     def notes(self) -> dict[tuple[int, ...], str]:
-        """Return marks for finished steps and for the primitive in progress, by the step's path."""
+        """Return marks for finished steps and for the primitive in progress; the keys are the paths of the steps."""
         if self.event is None:
             return {}
         notes = {step.path: "✓" for step in self.event.plan.walk() if _is_done(step, self.event)}
@@ -91,8 +91,8 @@ class View:
 def spectator(watch: bool = True, other: Observer | None = None) -> Iterator[Observer | None]:
     """Yield an observer that shows an execution in a notebook, or on stderr if stderr is a terminal.
 
-    The observer also notifies the observer `other`. Without `watch`, or if there is nowhere to show the execution, the context
-    manager yields `other`.
+    The observer passes each event to the observer `other`, too. Without `watch`, or if the execution can't be shown, the context
+    manager yields `other` itself.
     """
     if watch and _in_notebook():
         with in_notebook() as observer:

@@ -1,7 +1,7 @@
-"""The class `Memory` for users of Python and the command line: load, learn, save, merge, show.
+"""The class `Memory`, which users of Python and the command line load, train, save, merge and show.
 
-A memory file holds two kinds of experience. Rules with counts guide the default planner (`confab.reasoner.memory.experience`).
-The paper's links between facts and quantified behaviours guide the paper's mode (`confab.reasoner.memory.links`).
+A memory file has two kinds of experience. Rules with counts guide the default planner (`confab.reasoner.memory.experience`). The
+links between facts and quantified behaviours guide the paper's mode (`confab.reasoner.memory.links`).
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 
 
 MOST_LINKS = 20_000
-"""Maximum number of the paper's links in a memory. A plan that would add more links is learned for the default planner only."""
+"""Maximum number of the paper's links in a memory. From a plan that would add more links, only the default planner learns."""
 SHOWN = 3
 """Maximum number of preferences that are listed for a method."""
 
@@ -62,8 +62,7 @@ class Memory(metaclass=RightNames):
     Attributes
     ----------
     links : Links
-        The paper's probabilities p(situated object instance | quantified behaviour), which are read from the file on first
-        access.
+        The paper's probabilities p(situated object instance | quantified behaviour). They are read from the file on first access.
     names : Names
         The IRIs of short names.
     scene : str
@@ -74,7 +73,7 @@ class Memory(metaclass=RightNames):
         Replicas (writers of memories) whose experience may guide the search. The replica of this memory is always trusted. If
         the memory has experience of an untrusted replica, planning uses the mode ``strict``.
     labels : function, optional
-        A function that returns the labels of the scene's terms. It is called when a text needs labels.
+        A function that returns the labels of the scene's terms. The function is called when a text needs labels.
     """
 
     linked: Links | Callable[[], Links]
@@ -147,9 +146,9 @@ class Memory(metaclass=RightNames):
         ----------
         scene : Scene
         plan : Plan, Result, Execution or file
-            An executed plan. For an execution, the method `live` is called.
+            An executed plan. If it is an execution, the method `live` is called.
         failed : path of a step, optional
-            The failed step, or None. All earlier steps succeeded, and all later steps were not executed.
+            The failed step, or None. All earlier steps have succeeded, and no later step was executed.
 
         Raises
         ------
@@ -202,7 +201,7 @@ class Memory(metaclass=RightNames):
         return learned if len(learned) <= MOST_LINKS else self.links
 
     def merge(self, other: Memory | str | Path, trust: bool = False) -> None:
-        """Add the counts, but not the links, of another memory. With `trust`, the replicas of the other memory are trusted."""
+        """Add the counts of another memory, but not its links. With `trust`, the replicas of the other memory are trusted."""
         if not isinstance(other, Memory):
             other = Memory.load(other)
         self.experience.merge(other.experience)
@@ -224,7 +223,7 @@ class Memory(metaclass=RightNames):
             self.trusted.add(replica)
 
     def live(self, problem: Problem, episode: Episode) -> None:
-        """Learn from an execution: from all steps, or only from the failed behaviours if there was an intervention or a failure.
+        """Learn from an execution. After an intervention or a failure, only the failed behaviours are learned, otherwise all steps.
 
         Parameters
         ----------
@@ -237,7 +236,7 @@ class Memory(metaclass=RightNames):
         begun = replace(problem, initial=episode.initial, goal=episode.goal)
         failures = list(failed_steps(problem, episode))
         whole = not episode.interventions and not episode.failures
-        with suppress(LearningError):  # raised if the executed steps aren't applicable in the first observed state
+        with suppress(LearningError):  # the executed steps aren't applicable in the first observed state
             if whole or failures:
                 live(self.experience, begun, episode.done if whole else Plan(()), failures=failures)
 
@@ -314,7 +313,7 @@ class Memory(metaclass=RightNames):
         return Table(("goals", "rule", "chosen", "passed over", "failed"), tuple(rows[:most]))
 
     def told(self, most: int | None = None) -> list[tuple[str, list[str]]]:
-        """Return pairs of a kind of goal and its rules, as sentences with counts."""
+        """Return, for each kind of goal, a pair of its description and its rules, as sentences with counts."""
         found: list[tuple[str, list[str]]] = []
         for row in self.advice(most):
             record, rule, chosen, passed, failed = map(str, row)
@@ -334,7 +333,7 @@ class Memory(metaclass=RightNames):
         return "\n".join([*lines, *(["", "Besides:"] if others else []), *(f"  – {other}" for other in others)])
 
     def also(self) -> list[str]:
-        """Return the learned orders of goals and methods as sentences with their counts."""
+        """Return, as sentences with counts, the learned orders of goals and the learned methods."""
         from confab.planner.experience.evidence import DECAY
         from confab.planner.experience.following import usable
 
@@ -401,7 +400,7 @@ def _labels(scene: Known) -> Callable[[], Labels]:
 
 
 def preferred(say: Sayings, facts: Mapping[Fact, tuple[float, float]]) -> list[str]:
-    """Return the strongest recent preferences for individuals as sentences, the strongest first."""
+    """Return the strongest recent preferences between individuals as sentences, the strongest first."""
     clear = sorted(((abs(c - p), say.asked(fact, {}), c - p) for fact, (c, p) in facts.items()), reverse=True)
     return [f"{'lately' if lead > 0 else 'not lately'} {text}" for by, text, lead in clear[:SHOWN] if by >= 0.5]
 
@@ -418,7 +417,9 @@ def counted(number: int, noun: str) -> str:
 
 
 def endpoint(source: str | Path) -> str | None:
-    """Return the URL in a text or a path, or None for the name of a file. The slash that `Path` removes from a URL is restored.
+    """Return the URL that a text or a path contains; return None for the name of a file.
+
+    If `Path` has removed a slash of the URL, the slash is restored.
 
     Examples
     --------
@@ -430,12 +431,15 @@ def endpoint(source: str | Path) -> str | None:
 
 
 def undisturbed(target: str | Path) -> AbstractContextManager[None]:
-    """Lock a memory file against other writers. An endpoint needs no lock, since each replica has a separate graph."""
+    """Lock a memory file, so that no other writer changes it. An endpoint needs no lock, since each replica has its own graph."""
     return nullcontext() if endpoint(target) else alone(Path(target))
 
 
 def failed_steps(problem: Problem, episode: Episode) -> Iterator[tuple[Problem, Step, tuple[int, ...]]]:
-    """Yield each failed first-level step of an episode, with the problem in the state of the failure and the primitive's path."""
+    """Yield each failed first-level step of an episode, with a problem and the path of the failed primitive.
+
+    Each step is yielded twice: with a problem in the state of the failure, and with a problem in the episode's initial state.
+    """
     plans = [*episode.planned.steps, *(step for replan in episode.replans for step in replan.steps)]
     for failure in episode.failures:
         wanted = failure.step.behavior, failure.step.arguments

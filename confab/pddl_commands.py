@@ -101,16 +101,16 @@ def read_pddl_plan(
 ) -> Plan:
     """Return the plan that another planner found for an exported level.
 
-    A planner without hierarchy interleaves independent steps arbitrarily, so that one hand may wait at a place that the other
-    hand needs. With `regroup`, each step is moved directly after the latest step on which it depends. With `shorten`, steps
-    that the goal doesn't need are removed. The values of a behaviour's variables (such as the object that is grasped) follow
-    from the state before the step. From the first inapplicable step on, the variables have no values, and validation reports a
-    fault.
+    A planner without a hierarchy orders independent steps arbitrarily, so that one hand may wait at a place that the other hand
+    needs. With `regroup`, each step is moved directly after the latest step on which it depends. With `shorten`, steps that the
+    goal doesn't need are removed. The values of a behaviour's variables (such as the object that is grasped) follow from the
+    state before the step. If a step is inapplicable, the variables of this step and of all later steps have no values, and
+    validation reports a fault.
 
     Raises
     ------
     KnowledgeError
-        A line of the text is no action of the exported level.
+        A line of the text isn't an action of the exported level.
     """
     level = problem.domain.levels[-1] if level is None else level
     try:
@@ -131,7 +131,7 @@ def read_pddl_plan(
 
 
 def _regrouped(problem: Problem, level: int, plan: list[Ground], shorten: bool) -> list[Ground]:
-    """Return the regrouped steps; return them unchanged if the level can't be grounded, also for lack of time."""
+    """Return the regrouped steps. If the level can't be grounded, for example because time is short, return the steps unchanged."""
     try:
         task = ground(problem, level)
     except (OutOfTimeError, UngroundableError):

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 class SuccessJson(TypedDict):
-    """The number of verified rollouts, the confidence interval of their rate, and the mean poured share of a serving."""
+    """The number of verified rollouts, the confidence interval of their rate, and the mean share of a serving that was poured."""
 
     verified: int
     of: int
@@ -61,8 +61,8 @@ class ReportJson(TypedDict):
 class Report(metaclass=RightNames):
     """The report of a verification: the rollouts (executions in simulation) of a plan, and the film of the first rollout.
 
-    A rollout is good if every primitive had the expected effects and no final observation contradicts a goal. `trusted`
-    has the numbers of effects of the plan that are not verified, since no perceiver reads their situation type.
+    A rollout is good if every primitive had the expected effects and no final observation contradicts a goal. Effects on
+    situation types that no perceiver reads aren't verified; `trusted` has the numbers of these effects.
     """
 
     plan: Plan
@@ -79,7 +79,7 @@ class Report(metaclass=RightNames):
 
     @property
     def good(self) -> int:
-        """Number of good rollouts."""
+        """The number of good rollouts."""
         return sum(rollout.ok and not self.missed(rollout) for rollout in self.rollouts)
 
     @property
@@ -89,19 +89,22 @@ class Report(metaclass=RightNames):
 
     @property
     def film_speed(self) -> float:
-        """Ratio of simulated time to the film's time."""
+        """The ratio of simulated time to the film's time."""
         from confab.sim.film import SPEED
 
         return SPEED
 
     def missed(self, rollout: Rollout) -> list[Fact]:
-        """Return the goals that the final observations of a rollout contradict; symbols without a perceiver are skipped."""
+        """Return the goals that the final observations of a rollout contradict.
+
+        Goals on symbols without a perceiver are skipped.
+        """
         wanted = [Fact(symbol, value) for symbol, value in self.goal.items()]
         return [fact for fact in wanted if rollout.state.get(fact.symbol, fact.value) != fact.value]
 
     @property
     def poured(self) -> float | None:
-        """Mean poured share of a serving over all pours of all rollouts, or None if nothing was poured."""
+        """The share of a serving that was poured, as the mean over all pours of all rollouts; None if nothing was poured."""
         shares = [share for rollout in self.rollouts for share in rollout.poured]
         return sum(shares) / len(shares) if shares else None
 
@@ -159,7 +162,7 @@ class Report(metaclass=RightNames):
         )
 
     def _on_trust(self) -> str:
-        """Return the numbers of effects that are not verified, by situation type, as text."""
+        """Return, as text, the number of unverified effects on each situation type."""
         effects = ", ".join(f"{count} of {situation}" for situation, count in self.trusted.items())
         return f"; on trust, since no perceiver reads the effects: {effects}" if effects else ""
 
@@ -232,7 +235,7 @@ def verify(
     ----------
     scene, plan
     rollouts, seed
-        Number of rollouts, which have the seeds `seed`, `seed` + 1, …
+        The number of rollouts, and the seed of the first rollout. The seed grows by 1 with each rollout.
     perturb
         Vary poses, friction, masses and filled amounts at random.
     noise
@@ -240,15 +243,15 @@ def verify(
     video
         Film the first rollout.
     prepare
-        Called with each world before the first step, for instance to inject a fault (`confab.sim.faults`).
+        A function that is called with each world before the first step, for instance to inject a fault (`confab.sim.faults`).
     progress
-        Called before each step of a single or filmed rollout, with the number of steps done.
+        A function that is called before each step of a single or filmed rollout, with the number of finished steps.
     workers
         Number of processes, or the address of a Ray cluster (`confab.sim.rollouts.rollouts`).
     done
-        Called with each finished rollout.
+        A function that is called with each finished rollout.
     goal
-        Goals that the final observation must confirm; by default the scene's goals.
+        The goals that the final observation must confirm; by default the scene's goals.
     gui
         Show the first rollout on the screen, in real time or slower.
     time_limit
@@ -257,7 +260,7 @@ def verify(
     Raises
     ------
     KnowledgeError
-        The plan isn't applicable in the scene's initial state, the scene has no geometry, or `workers` or a screen isn't
+        The plan isn't applicable in the scene's initial state, the scene has no geometry, or the workers or a screen aren't
         available.
     """
     number("rollouts", rollouts, "how often, e.g. 3")
@@ -298,7 +301,7 @@ def verify(
 
 
 def on_trust(scene: Known, expected: Sequence[State]) -> dict[str, int]:
-    """Return the numbers of changes between successive states that no perceiver reads, by situation type."""
+    """Return, by situation type, the numbers of changes between successive states that no perceiver reads."""
     counts: dict[str, int] = {}
     for before, after in pairwise((scene.problem.initial, *expected)):
         for symbol in {*before, *after}:
@@ -334,7 +337,7 @@ def _shown(
     gui: bool,
     labels: Labels,
 ) -> Rollout:
-    """Execute the rollout of a seed; film the rollout, show the rollout on the screen, or both."""
+    """Execute the rollout with a seed, and film it, show it on the screen, or both."""
     watching: list[Callable[[Engine], None]] = []
 
     def watch(world: Engine) -> None:

@@ -76,7 +76,7 @@ def draw(scene: Known, path: Path, behavior: str | None = None, classes: bool = 
 
 
 def words_as_they_are() -> AbstractContextManager[None]:
-    """Return a context in which matplotlib draws ``$`` as a character, and not as the begin of a formula."""
+    """Return a context in which matplotlib draws ``$`` as a character, and not as the beginning of a formula."""
     from matplotlib import rc_context
 
     return rc_context({"text.parse_math": False})
@@ -92,7 +92,7 @@ def save(figure: Figure, path: Path, dpi: int = 100) -> Path:
 
 
 def card(scene: Known, name: str) -> Figure:
-    """Return a diagram of a behaviour between its preconditions and its effects, which are labelled with sentences."""
+    """Return a diagram of a behaviour between its preconditions and its effects, all of them as sentences."""
     from matplotlib.figure import Figure
 
     behavior = behavior_named(scene.reading, name)
@@ -175,7 +175,7 @@ def class_tree(scene: Known) -> Figure:
 
 
 def _reduced(pairs: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
-    """Return the pairs of class and subclass without the redundant pairs that reasoners write into files."""
+    """Return pairs of a class and a subclass without redundant pairs, which reasoners write into files."""
     import networkx
 
     graph: networkx.DiGraph[str] = networkx.DiGraph(pair for pair in pairs if pair[0] != pair[1])
@@ -224,7 +224,7 @@ def _top(world: PhysicsWorld, name: str) -> Array:
 
 
 def _table(scene: Known, path: Path) -> Path:
-    """Draw the table in the initial state. A place that not every hand reaches is labelled with the hands that reach the place."""
+    """Draw the table in the initial state. If only some hands reach a place, the place is labelled with these hands."""
     from PIL import Image, ImageDraw, ImageFont
     from PIL.PngImagePlugin import PngInfo
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from confab.reasoner.memory.links import Links
 
 NO_ENGINE = "none"
-"""Value of the option `engine` for planning without external planners."""
+"""The value of the option `engine` that excludes external planners."""
 OPTIMAL_SECONDS = 10.0
 """Default time limit of the search for an optimal plan in seconds."""
 
@@ -85,12 +85,12 @@ class PlanOptions:
 
     @property
     def asks_for_least(self) -> bool:
-        """Whether an option other than `mode` requires the optimal search."""
+        """Whether an option requires the optimal search, other than the option `mode`."""
         return self.optimal or self.minimise in ("cost", "steps")
 
     @property
     def strategy(self) -> str:
-        """The mode of planning that results from all options."""
+        """The mode of planning according to all options."""
         return "optimal" if self.asks_for_least else self.mode
 
     @property
@@ -100,7 +100,7 @@ class PlanOptions:
 
 
 def leaves_levels(levels: str) -> bool:
-    """Return whether the value of ``--levels`` allows plans without steps of some levels."""
+    """Return whether the value of ``--levels`` permits plans that have no steps of some levels."""
     if levels not in ("free", "strict"):
         raise KnowledgeError(f"--levels is '{levels}'; wanted free or strict")
     return levels == "free"

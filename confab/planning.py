@@ -59,11 +59,13 @@ if TYPE_CHECKING:
     from confab.why import Account, Because, WhyNot
 
 OURS = 0.6
-"""Share of the time limit for Confab's own search if an installed engine is tried, or the plan is scheduled, after the search."""
+"""The share of the time limit that Confab's own search may use if an installed engine is tried, or the plan is scheduled, after
+the search.
+"""
 OURS_WORK = 10_000_000
-"""Work limit of Confab's own search (number of states times operators) if an engine is tried and there is no time limit.
+"""Maximum work of Confab's own search (states times operators) before an engine is tried, if there is no time limit.
 
-The search exhausts this limit after about twenty seconds.
+The search does this work in about twenty seconds.
 """
 
 
@@ -88,16 +90,17 @@ def plan(
     ----------
     scene : Scene
     goals, goal : str or iterable of str
-        Facts like ``cup2 LOCATION location8``, each of which replaces the scene's goal for the same symbol.
+        Facts like ``cup2 LOCATION location8``. Each replaces the scene's goal for the same symbol.
     memory : Memory, its file or endpoint, or Links alone in paper mode; optional
         The memory that guides the search; by default none.
     mode : str
-        ``paper`` is A* with the paper's equation (5) on each level, with all behaviours quantified in the scene.
-        ``guarded``, ``leading`` and ``strict`` are modes of the default planner, which reads only the individuals that
-        the task can need. Learned rules guide the search in the mode ``guarded`` only if they have proved useful, in
-        ``leading`` always, and in ``strict`` never. For ``optimal``, see the parameter `optimal`.
+        ``paper`` is A* with the paper's equation (5) on each level; the scene's behaviours are quantified with all individuals.
+        ``guarded``, ``leading`` and ``strict`` are modes of the default planner, which reads only the individuals that the task
+        can need. In ``leading``, learned rules always guide the search; in ``guarded``, only rules that have proved useful do; in
+        ``strict``, no rules do. For ``optimal``, see the parameter `optimal`.
     time_limit : float or Deadline, optional
-        Time limit of the call in seconds, or its deadline. The optimal search has the default `OPTIMAL_SECONDS`.
+        Time limit of the call in seconds, or its deadline. Only the optimal search has a default limit, which is
+        `OPTIMAL_SECONDS`.
     optimal : bool
         Improve the plan until it is proved optimal or the time limit is reached. The result has the proved bound. A memory
         can't be used.
@@ -111,12 +114,12 @@ def plan(
     level : int, optional
         The level on which the engine plans; by default the lowest level.
     leave_levels : bool
-        Whether steps of a lower level may replace steps of a level without a refinable plan. The outcome names the replaced
-        parts and the violated conditions of the upper level.
+        Whether, if no plan of a level can be refined, steps of a lower level may replace steps of that level. The outcome names
+        the replaced parts and the conditions of the upper level that are violated.
     minimise : str, optional
-        With ``makespan``, the plan gets a schedule (`Result.timed`), in which equivalent actors may be exchanged. ``cost`` is
-        the same as `optimal`. ``steps`` is the optimal search with a cost of 1 for every step. By default, no minimum is
-        proved.
+        With ``makespan``, the plan gets a schedule (`Result.timed`), in which equivalent actors may be exchanged. ``cost`` is the
+        same as `optimal`. ``steps`` is the optimal search with a cost of 1 for every step. By default, the plan needn't be
+        minimal.
 
     Raises
     ------
@@ -177,7 +180,7 @@ def _plan(
         return with_goals(scene.problem, goals)
 
     faulty = [*never_done(problem)]
-    if faulty and not seen.whole:  # an individual outside the read part may have the value
+    if faulty and not seen.whole:  # an individual that wasn't read may have the value
         problem = whole()
         faulty = [*never_done(problem)]
 
@@ -264,7 +267,7 @@ def _plan(
     if in_part and (
         outcome.status is Status.UNSOLVABLE
         or (outcome.plan and refused(scene.knowledge, seen, outcome.plan, goals, outcome.unmet))
-    ):  # reads the whole scene, in which there may be a plan, or the plan may be invalid
+    ):  # reads the whole scene: there may be a plan in it, or the plan may be invalid in it
         anew = whole()
         if anew != seen.problem:
             in_part = False
@@ -280,13 +283,13 @@ def _plan(
 
 
 def _none_at_all(problem: Problem, deadline: Deadline) -> bool:
-    """Return whether a proof that the task has no plan is found within half of the remaining time."""
+    """Return whether half of the remaining time suffices for a proof that the task has no plan."""
     limits = Limits(seconds=None if deadline.left is None else deadline.left / 2)
     return solve(Request(problem, limits=limits)).status is Status.UNSOLVABLE
 
 
 def _by_an_engine(problem: Problem, deadline: Deadline) -> Outcome | str | None:
-    """Return the outcome of an engine that found a plan, the reason why no plan was found, or None if no engine is installed."""
+    """Return the outcome of an engine that found a plan, or the reason why there is none. Return None if no engine is installed."""
     from confab.engines import plan_by_engine, some_installed
 
     if not some_installed(problem):
@@ -307,7 +310,7 @@ def _seen(reading: Reading, observed: str | Path | None) -> Reading:
 
 
 AnyStep: TypeAlias = "int | str | tuple[int, ...] | tuple[str, ...] | Step"
-"""The notations of a step of a plan, as `Result.why` describes them."""
+"""The notations of a step of a plan; `Result.why` describes them."""
 
 
 @right_names("a result", "scene.plan()")
@@ -316,8 +319,8 @@ class Result(metaclass=RightNames):
     """The result of planning: the outcome, with the plan if one was found, and the scene of the call.
 
     `problem` has the individuals that the task can need. `queries` is the number of queries to the store. `part` is the part of
-    the scene from which the problem was read, or None for the whole scene. `goals` are the goals that replaced goals of the
-    task.
+    the scene from which the problem was read; it is None for the whole scene. `goals` are the given goals, which replaced goals
+    of the task.
     """
 
     scene: Known = field(compare=False)
@@ -338,7 +341,7 @@ class Result(metaclass=RightNames):
 
     @property
     def plan(self) -> Plan:
-        """The plan; without a plan, a `KnowledgeError` with the reason is raised."""
+        """The plan. If there is no plan, a `KnowledgeError` with the reason is raised."""
         if self.outcome.plan is None:
             reason = self.outcome.reason.text if self.outcome.reason else ""
             raise KnowledgeError(f"there is no plan ({self.outcome.status.value}): {reason}")
@@ -357,7 +360,10 @@ class Result(metaclass=RightNames):
         return len(self.plan)
 
     def __getitem__(self, index: AnyStep) -> Step:
-        """Return a step of the plan in one of the notations of `why`. A negative number counts from the end."""
+        """Return the step of the plan that an index names in one of the notations of `why`.
+
+        A negative number counts from the end.
+        """
         from confab.why import find_step
 
         return self.plan[index] if isinstance(index, int) else find_step(self.plan, index, self.labels)
@@ -437,8 +443,8 @@ class Result(metaclass=RightNames):
         Parameters
         ----------
         step : Step, int, str or path
-            The step in one of these notations: the number of a step of the first level, counted from 0; ``L3#12`` for step 12
-            of level 3, counted from 0; a path like ``0.1.2``; or words of the step, also as a tuple.
+            The step in one of these notations, in which steps are counted from 0: the number of a first-level step; ``L3#12`` for
+            step 12 of level 3; a path like ``0.1.2``; or words of the step, as one text or as a tuple.
 
         Examples
         --------
@@ -457,16 +463,17 @@ class Result(metaclass=RightNames):
     def why_not(self, asked: str, instead: AnyStep | None = None, seconds: float | None = None) -> WhyNot:
         """Return why an alternative isn't in the plan.
 
-        The answer has the failing conditions of the alternative, or a plan with the alternative and its additional cost.
+        The answer has the failing conditions of the alternative, or a plan with the alternative and the additional cost of this
+        plan.
 
         Parameters
         ----------
         asked : str
-            The alternative: a goal like ``cup2 LOCATION location8``, also followed by ``by left_hand``, or a behaviour like
+            The alternative. It is a goal like ``cup2 LOCATION location8``, which ``by left_hand`` may follow, or a behaviour like
             ``B2_PICK right_hand cup1`` or ``B2_PICK hand=right_hand``.
         instead : Step, int, str or path, optional
-            The step to be replaced by the behaviour; by default the most similar step in whose place the behaviour is
-            applicable.
+            The step that the behaviour would replace. By default, it is the most similar of the steps in whose place the
+            behaviour is applicable.
         seconds : float, optional
             Time limit of the whole call.
         """
@@ -483,7 +490,7 @@ class Result(metaclass=RightNames):
             return other.problem, other.outcome, other.labels
 
         with within(seconds):
-            choice = BY.search(asked) is not None  # possibly only the whole scene has the individual
+            choice = BY.search(asked) is not None  # perhaps only the whole scene has the individual
             if choice and self.part is not None:
                 return self.in_whole_scene().why_not(asked, instead)
             labels = self.labels
@@ -496,7 +503,7 @@ class Result(metaclass=RightNames):
             return self.in_whole_scene().why_not(asked, instead)
 
     def in_whole_scene(self) -> Result:
-        """Return the same result with the problem of the whole scene instead of the problem of a part."""
+        """Return the same result, with the problem of the whole scene in place of the problem of a part."""
         if self.part is None:
             return self
         whole = with_goals(self.scene.problem, self.goals)
@@ -547,7 +554,7 @@ class Result(metaclass=RightNames):
     def dearer(self) -> str:
         """Return a remark on possible cheaper plans, and the option that searches for a cheaper plan.
 
-        The text is empty if there is no reason to expect a cheaper plan, or if the search has proved a bound.
+        The text is empty if nothing indicates a cheaper plan, or if the search has proved a bound.
 
         Examples
         --------

@@ -18,12 +18,12 @@ PATIENCE = 1.0
 """Seconds before a progress bar appears."""
 
 Advance: TypeAlias = Callable[[str, int], None]
-"""A function that receives the present activity and the amount of additional work done."""
+"""A function that receives the present activity and the amount of work done since the last call."""
 
 
 @contextmanager
 def progress(what: str, total: int | None = None) -> Iterator[Advance]:
-    """Show a progress bar for work that takes longer than `PATIENCE`; yield the function that advances the bar.
+    """Show a progress bar for work that takes more than `PATIENCE` seconds; yield the function that advances the bar.
 
     Parameters
     ----------

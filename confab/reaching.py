@@ -18,7 +18,7 @@ ROBOTS = f"""PREFIX e: <{EMBODIMENT}>
 SELECT ?robot WHERE {{ ?robot e:urdf ?file . FILTER NOT EXISTS {{ ?ontology :symbolicOnly true }}
   FILTER NOT EXISTS {{ GRAPH <{BASE}asserted> {{ ?episode a <{EPISODES}Episode> }} }}
   FILTER NOT EXISTS {{ ?memory :memoryFormat ?format }} }}"""
-"""Query for the robots of a scene with geometry. Files of episodes and memories have no result."""
+"""Query for the robots of a scene with geometry. For files of episodes and memories, the result is empty."""
 
 REACHED = "SELECT DISTINCT ?place WHERE {{ ?hand <{relation}> ?place }}"
 """Query for the places that at least one hand reaches."""
@@ -30,11 +30,11 @@ def has_robot(scene: Known) -> bool:
 
 
 def with_current_reach(scene: S, tell: Callable[[str], None]) -> S:
-    """Return a scene whose reach facts are up to date if it has a robot with a body; other scenes are returned unchanged.
+    """Return a scene with up-to-date reach facts; a scene without a robot's body is returned unchanged.
 
-    If the file of reach facts is missing or older than a file of the scene, the reach facts are checked, and computed
-    if necessary. If the bodies are described incompletely, the scene is returned unchanged, and `tell` is called with
-    the missing statement. The reach facts of shipped scenes are always up to date.
+    If the file of reach facts is missing or older than a file of the scene, the reach facts are checked, and computed if
+    necessary. If the description of the bodies is incomplete, the scene is returned unchanged, and `tell` is called with the name
+    of the missing statement. The reach facts of shipped scenes are always up to date.
     """
     graph = scene.knowledge
     if graph.remote or graph.faults or not graph.select(ROBOTS):
@@ -102,7 +102,7 @@ def with_reach(scene: S) -> S:
 
 
 def unreached(scene: Known) -> list[str]:
-    """Return a sentence for each place in initial facts or goals that no hand reaches, with the obstacle for each hand."""
+    """Return a sentence for each unreachable place in initial facts or goals, with the obstacle for each hand."""
     from confab.reasoner.embodiment.reach import reach_relation
     from confab.sim.reach import hindrance
 

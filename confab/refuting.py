@@ -1,4 +1,4 @@
-"""Refutations: behaviours that physics found impossible in a situation, and that the next plan and later calls avoid."""
+"""Refutations: behaviours that were found to be impossible in physics, in a situation. The next plan and later calls avoid them."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def keep(scene: Known, refutations: Sequence[Refutation]) -> None:
         return
     file = path.with_name(f"{path.stem}.reach.ttl")
     triples = [triple for one in refutations for triple in refuted(scene.knowledge, scene.reading, one)]
-    with suppress(FileNotFoundError):  # a scene whose author states the reach facts has no such file
+    with suppress(FileNotFoundError):  # if the author of a scene states the reach facts, there is no such file
         try:
             add_to_reach(file, scene.knowledge, triples)
         except (PermissionError, FileExistsError, KnowledgeError) as error:

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 YES, NO, GAVE_UP = 0, 1, 3
 TOLD = 8
-"""Number of primitives between two lines about the progress of execution in an output without a progress bar."""
+"""Number of primitives between two lines about the progress of execution, if the output shows no progress bar."""
 
 
 @dataclass(frozen=True)
@@ -66,14 +66,14 @@ class Job:
 def run(job: Job) -> int:
     """Validate a scene, plan, verify the plan in physics, learn from the plan, print the results, and write files.
 
-    Without a robot's body in the scene, the plan isn't executed in physics. If PyBullet isn't installed, the plan isn't
-    executed either, a remark states the reason, and the exit code is 2.
+    If the scene has no robot's body, the plan isn't executed in physics. If PyBullet isn't installed, the plan isn't executed
+    either; a remark then states the reason, and the exit code is 2.
 
     Returns
     -------
     int
-        The exit code is 0 for a good plan, 1 for an invalid scene, an unsolvable task or a failure in physics, 2 for a plan
-        that is not verified since PyBullet is missing, and 3 if planning gave up.
+        The exit code: 0 for a good plan; 1 for an invalid scene, an unsolvable task or a failure in physics; 2 if the plan isn't
+        verified because PyBullet is missing; 3 if planning gave up.
 
     Raises
     ------
@@ -132,7 +132,7 @@ def run(job: Job) -> int:
 
 
 def persuaded(scene: Scene, result: Result, job: Job, plan: Callable[[Scene], Result]) -> tuple[Scene, Result, Report]:
-    """Verify a plan in physics, and plan again as long as physics refutes the plan.
+    """Verify a plan in physics; as long as the verification refutes the plan, plan again.
 
     Return the scene with all refutations, the last result of planning, and the report of its verification. Refutations are
     saved if the next plan differs from the refuted plan.
@@ -168,8 +168,8 @@ def verified(scene: Scene, result: Result, job: Job) -> Report:
 def written(scene: Scene, result: Result, report: Report | None, learned: Memory | None, job: Job) -> dict[str, Path]:
     """Write the files of a run, and return their paths by kind.
 
-    Each run has a report and a record. A plan, the verdicts and observed facts of a rollout, and a film are written if
-    available.
+    Each run has a report and a record. If they are available, a plan, the verdicts and observed facts of a rollout, and a film
+    are written, too.
     """
     from confab.page.data import page_data
     from confab.page.frozen import write_page

@@ -43,8 +43,8 @@ def read_episode(scene: Known, path: Path) -> Execution:
     scene : Scene
         The scene of the execution.
     path : Path
-        The output of ``confab execute --json``, or a JSON file of `Execution.save`. The returned execution lacks the states
-        before failures, and the static facts on which steps relied, since the file doesn't contain them.
+        The output of ``confab execute --json``, or a JSON file of `Execution.save`. The file doesn't contain the states before
+        failures, or the static facts on which steps relied; the returned execution lacks them.
 
     Raises
     ------
@@ -143,7 +143,10 @@ def read_report(scene: Known, verdicts: Path, plan: Plan) -> Report:
 
 @contextmanager
 def _read(path: Path, wanted: str) -> Iterator[Data]:
-    """Yield the JSON data in a file; errors of the block about missing or malformed data become `KnowledgeError`."""
+    """Yield the JSON data in a file.
+
+    If the ``with`` block finds missing or malformed data, its error becomes a `KnowledgeError`.
+    """
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -164,7 +167,10 @@ def _read(path: Path, wanted: str) -> Iterator[Data]:
 def _interventions(
     problem: Problem, data: Data
 ) -> tuple[tuple[tuple[Intervention, float], ...], tuple[Intervention, ...], Problem]:
-    """Return the interventions that took place (with times), all other interventions, and the problem with added individuals."""
+    """Return the interventions that took place with their times, the other interventions, and the extended problem.
+
+    The problem is extended by the individuals that were discovered or added during the execution.
+    """
     from confab.execution import parse_intervention
 
     for one in data.get("discovered", []):

@@ -1,4 +1,4 @@
-"""The class `Scene`, which adds planning, verification and execution to the knowledge in `confab.known`."""
+"""The class `Scene`, which adds planning, verification and execution to the class in `confab.known`."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Scene(Known):
     def picture(
         self, path: str | Path | None = None, behavior: str | None = None, classes: bool = False
     ) -> Path | Image:
-        """Draw the table with its places, a behaviour, or the classes into a file, or return the picture for a notebook.
+        """Draw the table with its places, a behaviour, or the classes. The picture goes into a file, or is returned for a notebook.
 
         Returns
         -------
@@ -92,7 +92,7 @@ class Scene(Known):
             return image.copy()
 
     def board(self) -> anywidget.AnyWidget:
-        """Return the page of the scene as a widget for a notebook, on which users change facts, goals and interventions.
+        """Return the page of the scene as a widget for a notebook. On the page, users change facts, goals and interventions.
 
         Raises
         ------
@@ -137,8 +137,8 @@ class Scene(Known):
         """Execute the task in a closed loop of action and observation (`confab.execution.execute`).
 
         The first plan is `plan`: a plan, a result, or the name of a plan file. New plans are made with `memory`. `Memory.live`
-        learns from the returned execution. With `watch`, a notebook or a terminal shows the execution. `observer` is called
-        with each event. After `time_limit` seconds the execution gives up.
+        learns from the returned execution. With `watch`, a notebook or a terminal shows the execution. The function `observer` is
+        called with each event. After `time_limit` seconds the execution gives up.
 
         Examples
         --------
@@ -210,7 +210,7 @@ class Scene(Known):
         return read_report(self, Path(verdicts), plan_of(plan, self.problem))
 
     def to_pddl(self, level: int | None = None) -> tuple[str, str]:
-        """Return a level, by default the lowest, as the texts of a PDDL domain and a PDDL problem.
+        """Return the texts of a PDDL domain and a PDDL problem for a level, by default the lowest.
 
         Raises
         ------
@@ -223,12 +223,12 @@ class Scene(Known):
         return found.domain, found.problem
 
     def to_unified_planning(self, level: int | None = None) -> unified_planning.model.Problem:
-        """Return a level, by default the lowest, as a problem of unified-planning, which is in the extra `pddl`.
+        """Return a level, by default the lowest, as a problem of unified-planning. The extra `pddl` installs unified-planning.
 
         Raises
         ------
         KnowledgeError
-            unified-planning isn't installed, or can't read the problem. For example, it doesn't support derived predicates.
+            unified-planning isn't installed, or can't read the problem, for example because of derived predicates.
         """
         from confab.engines import unified
 
@@ -247,7 +247,7 @@ class Scene(Known):
         return export_pddl(self.problem, level, Path(folder))
 
     def explain(self, goals: Facts = (), *, goal: Facts = (), **options: Unpack[plan_options.Options]) -> Account:
-        """Plan with the parameters of `plan`, and return why each step is in the plan, or why there is no plan.
+        """Plan with the parameters of `plan`. Return why each step is in the plan, or why there is no plan.
 
         Raises
         ------
@@ -282,17 +282,17 @@ def load(source: str | Path | rdflib.Graph | Scene | Sequence[str | Path], *, sc
     Parameters
     ----------
     source : str, Path, rdflib.Graph, Scene, or sequence of str or Path
-        The source of the scene. Of several files, the scene is the first file that no other file imports. A scene is returned
-        unchanged. A graph is copied, and may import shipped ontologies.
+        The source of the scene. If several files are given, the scene is the first file that no other file imports. A scene is
+        returned unchanged. A graph is copied, and may import shipped ontologies.
     scene : str, optional
         IRI of the scene at an endpoint with several scenes.
 
     Raises
     ------
     KnowledgeError
-        The scene doesn't exist, its syntax is invalid, or the endpoint is down, too slow, or no SPARQL endpoint. A file with
-        missing imports or without an ontology declaration can be loaded and queried. Planning in such a scene raises an error
-        that names the missing parts.
+        The scene doesn't exist, its syntax is invalid, or the endpoint is down, is too slow, or isn't a SPARQL endpoint. A file
+        with missing imports or without an ontology declaration can be loaded and queried; planning in such a scene raises an
+        error that names the missing parts.
 
     Examples
     --------
@@ -387,7 +387,10 @@ def scenes() -> list[str]:
 
 
 def described() -> Table:
-    """Return a table of the shipped scenes: name, levels, individuals of its file, whether physics can verify plans, and title."""
+    """Return a table of the shipped scenes.
+
+    The columns are: name, levels, number of individuals in the file, whether plans can be verified in physics, and title.
+    """
     import pyoxigraph as ox
 
     files, read, rows = ontology.shipped(), dict[Path, list[tuple[str, str]]](), []

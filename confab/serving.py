@@ -1,17 +1,17 @@
 """A scene as a page and a read-only SPARQL 1.1 endpoint on loopback (docs/serving.md, docs/page.md).
 
 ==============  ==========================================================================================================
-``/sparql``     the SPARQL 1.1 protocol (GET, POST of a form, POST of a query), or without a query the service description
-``/``           the page (`confab.page`)
-``/page.json``  the content of the page about the scene or a running execution (GET), and after changes of controls (POST)
+``/sparql``     the SPARQL 1.1 protocol (GET, POST of a form, POST of a query); without a query, the service description ``/``
+the page (`confab.page`) ``/page.json``  the content of the page about the scene or a running execution (GET), and after changes
+of controls (POST)
 ==============  ==========================================================================================================
 
 A GET of ``/page.json?after=VERSION`` is answered with status 204 if no newer version exists.
 
-The libraries uvicorn and starlette serve HTTP. Queries run in separate processes (`confab.reasoner.graph.query_process`), which
-form lanes with growing time limits. A query that exceeds the limit of a lane is started again in the next lane with lower
-priority. Short queries never wait for long queries. A query is cancelled when its client disconnects. Requests from
-other machines and from web pages of other sites are refused.
+The libraries uvicorn and starlette serve HTTP. Queries run in separate processes (`confab.reasoner.graph.query_process`). The
+processes are divided into lanes with growing time limits. If a query exceeds the limit of a lane, it is started again in the next
+lane, which has a lower priority. Short queries therefore never wait for long queries. A query is cancelled when its client
+disconnects. Requests from other machines and from web pages of other sites are refused.
 """
 
 from __future__ import annotations
@@ -68,15 +68,15 @@ PORT = 7879
 LANES, AT_ONCE = (0.05, 0.5, 5.0, None), 2
 """Time limits of the lanes in seconds, and maximum number of concurrent queries in each lane."""
 LARGEST, SLOWEST = 1_000_000, 20.0
-"""Maximum size of a request's body in bytes, and maximum time of receiving a request or sending an answer in seconds."""
+"""Maximum size of a request's body in bytes, and maximum time in seconds for receiving a request or sending an answer."""
 MOST = min(2_000, resource.getrlimit(resource.RLIMIT_NOFILE)[0] // 2)
 """Maximum number of open connections."""
 LAST_STATE = 2.0
-"""Maximum time in seconds for which a server that ends waits for a page to receive the last state of an execution."""
+"""Maximum time in seconds for which a server, before it ends, waits until a page has received the last state of an execution."""
 LOOPBACK = r"(localhost|127(\.\d{1,3}){3}|\[::1\])(:\d{1,5})?"
 ORIGIN = rf"https?://{LOOPBACK}"
 TARGET = re.compile(r"https?://(?P<host>[^/]*)(?P<path>/.*|)", re.IGNORECASE | re.DOTALL)
-"""Pattern of a request's target that contains a host."""
+"""Pattern of the target of a request, if the target contains a host."""
 SOLUTIONS = {
     "application/sparql-results+json": "sparql-json",
     "application/json": "sparql-json",
@@ -85,7 +85,7 @@ SOLUTIONS = {
     "text/csv": "sparql-csv",
     "text/tab-separated-values": "tsv",
 }
-"""Media types of answers to SELECT queries, with the default first. Answers to ASK queries have one of the first four types."""
+"""Media types of answers to SELECT queries; the first is the default. Answers to ASK queries have one of the first four types."""
 TRIPLES = {
     "text/turtle": ox.RdfFormat.TURTLE,
     "application/n-triples": ox.RdfFormat.N_TRIPLES,
@@ -111,7 +111,10 @@ class Worker:
         self.process.start()
 
     async def call(self, function: Callable[..., T], *arguments: object) -> T:
-        """Call a function in a thread and return its result; if the caller is cancelled, interrupt the process's query."""
+        """Call a function in a thread, and return its result.
+
+        If the caller is cancelled, the query of the process is interrupted.
+        """
         future = asyncio.get_running_loop().run_in_executor(self.service.threads, function, *arguments)
         self.running = future
         try:
@@ -119,13 +122,13 @@ class Worker:
         except asyncio.CancelledError:
             while not future.done():
                 self.process.interrupt()
-                with suppress(asyncio.CancelledError):  # the client leaves at a time limit
+                with suppress(asyncio.CancelledError):  # at a time limit, the client stops waiting
                     await asyncio.wait([future], timeout=0.05)
             future.exception()
             raise
 
     def return_to(self, lane: LifoQueue[Worker]) -> None:
-        """Make the worker available in a lane as soon as its last call has ended, even if the caller didn't wait for the end."""
+        """Make the worker available in a lane as soon as its last call has ended, even if the caller hasn't waited for the end."""
         self.running.add_done_callback(lambda _: lane.put_nowait(self))
 
 
@@ -188,7 +191,7 @@ class Service:
             worker.process.close()
 
     def page_json(self, after: int) -> bytes | None:
-        """Return the content of the page about a running execution or the scene, or None if the page has the newest version."""
+        """Return the content of the page about a running execution or the scene; return None if the page has the newest version."""
         self.page_version, self.page_asked = after, monotonic()
         if not self.following.begun:
             return json.dumps(self.sheet.scene_data).encode()
@@ -335,7 +338,7 @@ async def refused(request: Request, error: Exception) -> Response:
 
 
 async def fault(request: Request, error: Exception) -> Response:
-    """Respond to a request that caused a fault of the program."""
+    """Respond to a request that has caused a fault of the program."""
     if not isinstance(error, ClientDisconnect):
         log.error("confab: a request couldn't be answered", exc_info=error)
     return PlainTextResponse("a fault of Confab, not yours; see its log\n", 500)
@@ -398,7 +401,7 @@ def utf8(content: bytes) -> str:
 
 
 def preferred(accept: str, offered: Sequence[str]) -> str:
-    """Return the offered media type that an ``Accept`` header prefers; of equally preferred types, return the first.
+    """Return the offered media type that an ``Accept`` header prefers; if several are equally preferred, return the first of them.
 
     >>> preferred("text/csv;q=0.5, application/*", ["application/json", "text/csv"]), preferred("*/*", ["a/b", "c/d"])
     ('application/json', 'a/b')

@@ -19,7 +19,7 @@ Notes = Mapping[tuple[int, ...], str]
 """Remarks on steps, such as verdicts, by the step's path."""
 
 UNLIMITED = 100_000
-"""Width in columns of an output that isn't a terminal, so that no line is wrapped or cut."""
+"""Width in columns of an output that isn't a terminal; the width is so large that no line is wrapped or cut."""
 
 
 def page() -> Console:
@@ -30,20 +30,20 @@ def page() -> Console:
 
 
 def show(what: Any) -> None:
-    """Print an object that rich can show to stdout; lines are wrapped in a terminal only."""
+    """Print to stdout an object that rich can show; lines are wrapped in a terminal only."""
     page().print(what, markup=False, highlight=False)
 
 
 @dataclass(frozen=True)
 class PlanTree:
-    """A plan as a tree that rich prints, with ID, behaviour and arguments of every step."""
+    """A plan as a tree that rich prints, with the ID, the behaviour and the arguments of every step."""
 
     plan: Plan
     title: str
     notes: Notes
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Tree | Segment]:
-        """Yield a rich tree for a terminal and otherwise plain text, since rich is slow for large plans."""
+        """Yield a rich tree for a terminal. Yield plain text for other outputs, since rich is slow for large plans."""
         from rich.control import strip_control_codes
         from rich.segment import Segment
         from rich.text import Text
@@ -56,7 +56,7 @@ class PlanTree:
             yield tree
         else:
             yield Segment(f"{strip_control_codes(self.title)}\n")
-            # Each line is a segment, since rich splits a segment of many lines in quadratic time.
+            # Each line becomes a separate segment, since rich splits a segment of many lines in quadratic time.
             for line in _drawn(self.plan.steps, self.notes, ""):
                 yield Segment(f"{strip_control_codes(line)}\n")
 
@@ -86,7 +86,7 @@ def _drawn(steps: Sequence[Step], notes: Notes, indent: str) -> Iterator[str]:
 
 
 def _label(step: Step, notes: Notes) -> list[tuple[str, str]]:
-    """Return the line for one step as pieces of text, each with its style in rich."""
+    """Return the line for one step as pieces of text, each with a style of rich."""
     style = STYLES[min(len(step.path), len(STYLES)) - 1]
     label = [(f"{step.id:>2} ", "dim"), (step.behavior, style), (" " + " ".join(step.arguments), "")]
     if step.bindings and not step.steps:
@@ -97,7 +97,7 @@ def _label(step: Step, notes: Notes) -> list[tuple[str, str]]:
 
 
 def _label_of_joined(step: Step) -> list[tuple[str, str]]:
-    """Return the line for a step that is refined together with the step of the line before."""
+    """Return the line for a step that is refined together with the step of the previous line."""
     return _label(replace(step, bindings={}), {})
 
 
@@ -107,7 +107,7 @@ def lengths(plan: Plan) -> str:
 
 
 def _proved(plan: Plan, cost: float | None, bound: float | None) -> str:
-    """Return a text with the cost of a plan if behaviours have costs, and with the proved bound on its length or cost."""
+    """Return a text with the cost of a plan (if behaviours have costs) and the proved bound on its length or cost."""
     said = "" if cost is None else f", costs {cost:g}"
     if bound is None:
         return said

@@ -1,6 +1,6 @@
 """Start and end of the command `confab`. Ctrl-C ends the command with one line, even during imports.
 
-After the output is complete, the process ignores Ctrl-C. The process ends without freeing its objects one by one, which would
+After the output is complete, the process ignores Ctrl-C. At its end, the process doesn't free its objects one by one; this would
 take half a second for a large scene.
 """
 
@@ -21,7 +21,7 @@ def main() -> None:
 
     try:
         answer(ending=os._exit)
-    except SystemExit as end:  # the frames of the exception refer to all data of the process
+    except SystemExit as end:  # otherwise the frames of the exception would keep all data of the process
         _leave(end.code if isinstance(end.code, int) else 1)
 
 
@@ -36,6 +36,6 @@ def _leave(code: int) -> NoReturn:
 
 
 def _interrupted(*_: object) -> None:
-    """Print the message about an interrupt and end the process. The module `confab.cli` may not be imported yet."""
+    """Print the message about an interrupt, and end the process. The module `confab.cli` may still be unimported."""
     os.write(2, b"confab: interrupted; every file is unchanged or complete\n")
     os._exit(130)

@@ -48,7 +48,7 @@ class Row(tuple[str | None, ...]):
         return super().__getitem__(column(self._fields, index) if isinstance(index, str) else index)
 
     def __getattr__(self, name: str) -> str | None:
-        """Return the cell of a column, as in rows of rdflib: ``row.cup``."""
+        """Return the cell of the column with a name, so that ``row.cup`` works as in rows of rdflib."""
         if name.startswith("_"):
             raise AttributeError(f"a row has no '{name}'")
         try:
@@ -69,8 +69,9 @@ def column(names: tuple[str, ...], name: str) -> int:
 class Table(Sequence[tuple[str | None, ...]]):
     """A query result: a sequence of rows with named columns.
 
-    `terms` are the rows with the RDF terms (IRIs, datatypes) of the store. `truth` is the answer to an ASK query, and None for
-    other queries. A table is true if the answer to an ASK query is true or, for other queries, if the table has a row.
+    `terms` are the same rows with the RDF terms of the store, which have IRIs and datatypes. `truth` is the answer to an ASK
+    query, and None for other queries. In a condition, the table of an ASK query counts as its answer; any other table counts as
+    true if it has a row.
 
     Examples
     --------
@@ -124,7 +125,7 @@ class Table(Sequence[tuple[str | None, ...]]):
         return replace(self, rows=rows) if self.terms else self
 
     def dataframe(self) -> pandas.DataFrame:
-        """Return the rows as a pandas DataFrame with typed columns (pandas comes with the extra `notebook`)."""
+        """Return the rows as a pandas DataFrame with typed columns. The extra `notebook` installs pandas."""
         import pandas
 
         return pandas.DataFrame(self.values(), columns=list(self.columns)).convert_dtypes()
@@ -138,7 +139,7 @@ class Table(Sequence[tuple[str | None, ...]]):
         return text.getvalue()
 
     def tsv(self) -> str:
-        r"""Return the rows separated by tabs, with a header line; tabs, line ends and backslashes in cells are escaped.
+        r"""Return the rows as tab-separated values, with a header line; tabs, line ends and backslashes in cells are escaped.
 
         >>> Table(("what", "where"), (("cup 1", "a\tb"),)).tsv()
         'what\twhere\ncup 1\ta\\tb\n'
@@ -173,7 +174,7 @@ class Table(Sequence[tuple[str | None, ...]]):
         Raises
         ------
         KnowledgeError
-            The query is no CONSTRUCT query.
+            The query isn't a CONSTRUCT query.
         """
         import pyoxigraph as ox
 
@@ -210,7 +211,7 @@ class Table(Sequence[tuple[str | None, ...]]):
 
 
 def _value(cell: str | None, term: object) -> object:
-    """Return the Python value of a literal if its datatype has a counterpart in Python, otherwise the text of the literal."""
+    """Return a literal as a Python value if its datatype has a counterpart in Python, otherwise as text."""
     from pyoxigraph import Literal as Stored
 
     if not isinstance(term, Stored) or term.language is not None:

@@ -48,7 +48,9 @@ def run_to_end(call: Callable[[], int | None]) -> NoReturn:
         code = _interruptible(call) or YES  # a command without an exit code returns None
         sys.stdout.flush()
     except SystemExit as error:
-        closed = "PacifyFlush" in type(sys.stdout).__name__  # click replaces stdout when the reader of a pipe has ended
+        closed = (
+            "PacifyFlush" in type(sys.stdout).__name__
+        )  # click has replaced stdout if the reader of a pipe has ended
         sys.exit(PIPE_CLOSED if closed else error.code)
     except click.ClickException as error:
         _end(MISUSE, _usage(error))
@@ -80,7 +82,7 @@ def run_to_end(call: Callable[[], int | None]) -> NoReturn:
 
 
 def _interruptible(call: Callable[[], int | None]) -> int | None:
-    """Call a function; raise `KeyboardInterrupt` on Ctrl-C even if a library turns the interrupt into another error."""
+    """Call a function. On Ctrl-C, raise `KeyboardInterrupt` even if a library turns the interrupt into another error."""
     came = []
 
     def interrupt(sign: int, _: object) -> NoReturn:
@@ -110,7 +112,7 @@ def limited(seconds: float | None) -> Iterator[Deadline]:
 
 @contextmanager
 def ended_by(deadline: Deadline, ending: Ending | None) -> Iterator[None]:
-    """End the process if a block exceeds the block's time limit by a tenth, since a query of a store can't be interrupted.
+    """End the process if a ``with`` block exceeds its time limit by a tenth, since a query of a store can't be interrupted.
 
     Files that the block writes are complete or unchanged (`confab.reasoner.files.write_whole`).
     """
@@ -143,7 +145,7 @@ def told(out: Path, text: str) -> None:
 
 def show_result(what: Any) -> None:
     """Print JSON data, a text, a table or an object of rich to stdout; a table in a pipe has tab-separated values."""
-    # The check reads the class, since an object searches all modules for an unknown name.
+    # The check reads the class: for an unknown attribute of an object, all modules would be searched for the meant name.
     tsv = getattr(type(what), "tsv", None)
     if tsv is not None and not sys.stdout.isatty():
         print(tsv(what), end="")
@@ -161,7 +163,7 @@ def _open_streams() -> None:
     """Open the null device for each closed standard stream, so that no other file gets its descriptor."""
     closed = [stream for stream in (0, 1, 2) if not _is_open(stream)]
     for _ in closed:
-        os.open(os.devnull, os.O_RDWR)  # gets the lowest free file descriptor
+        os.open(os.devnull, os.O_RDWR)  # the device gets the lowest free file descriptor
     if 2 in closed:
         sys.stderr = open(2, "w", encoding="utf-8")  # noqa: SIM115
     if 1 in closed:
@@ -195,7 +197,7 @@ PARAMETER = re.compile(
     r"(?<![\w'])(?P<name>engine|gui|memory|minimise|mode|optimal|port|scene|time_limit|video)=(?P<value>None|True|'\w[\w-]*'|)"
     r"(?=[\s),;.]|$)"
 )
-"""Pattern of a Python parameter, perhaps with a value, for which the command line has an option of the same name."""
+"""Pattern of a Python parameter, perhaps with a value, if the command line has an option of the same name."""
 
 
 PLAINER = (
@@ -204,7 +206,7 @@ PLAINER = (
     (r"([-\d.e+]+) is not in the range x>(=?)([-\d.e+]+)$", r"\1; wanted a number >\2 \3"),
     (r"([-\d.e+]+) is not in the range ([-\d.e+]+)<=x<=([-\d.e+]+)$", r"\1; wanted a number from \2 to \3"),
 )
-"""Patterns of click's messages about numbers, and the same in plain words."""
+"""Patterns of click's messages about numbers, each with plain words that replace it."""
 
 
 def _usage(error: Any) -> str:
@@ -241,7 +243,7 @@ def by_options(text: str) -> str:
 
 
 def _in_place_of(option: str, context: click.Context) -> str:
-    """Return the replacement for an unknown option: another option, an argument, or an option of other commands."""
+    """Return what to use in place of an unknown option: another option, an argument, or an option of other commands."""
     from confab.guessing import chosen
     from confab.reasoner.names import nearest
 

@@ -19,7 +19,7 @@ from confab.planner.validation import successor
 from confab.reasoner.symbols import FALSE, Problem, State, Symbol
 
 LOOKS = 5
-"""Number of observations whose latency is measured."""
+"""The number of observations for which the latency is measured."""
 
 SOON = 1.0
 """Maximum duration of an observation, and of `stop`, in seconds."""
@@ -36,7 +36,7 @@ BEGUN = 0.05
 
 @dataclass(frozen=True)
 class Check:
-    """A check with its name, its verdict (None if the check was impossible), and a description of the result."""
+    """A check with its name, its verdict, and a description of the result. The verdict is None if the check was impossible."""
 
     name: str
     passed: bool | None
@@ -75,11 +75,11 @@ def check_world(
     Parameters
     ----------
     world : World
-        The world, whose state must be the initial state of the problem or similar to it.
+        The world. Its state must be the initial state of the problem, or a similar state.
     problem : Problem
         The problem of a scene, which defines the primitives and the symbols of the world.
     steps : sequence of Step, optional
-        Primitives to execute, in order; by default the primitives of a plan from the observed state to the problem's goal.
+        The primitives to execute, in order; by default, the primitives of a plan from the observed state to the problem's goal.
     stopped_within : float
         Time in seconds within which `execute` must return after `stop`.
 
@@ -206,7 +206,7 @@ def _stopped(
 
 
 def _after_idle_stop(step: Step, ended: Verdict | Exception) -> Check:
-    """Check that a call of `stop` without a running primitive didn't stop the next primitive."""
+    """Check that `stop` has no effect on the next primitive if it is called while no primitive runs."""
     if isinstance(ended, Exception):
         raise ended
     if ended.code == INTERRUPTED:
@@ -274,7 +274,7 @@ def _executed(world: Guarded, problem: Problem, steps: Sequence[Step], checks: l
 
 
 def _missing(problem: Problem, before: State, expected: Mapping[Symbol, str], seen: State) -> str:
-    """Return the first expected change that the observation contradicts, as text; amounts are not compared."""
+    """Return, as text, the first expected change that the observation contradicts; amounts aren't compared."""
     for symbol, value in sorted(expected.items()):
         kind = problem.domain.situations[symbol.situation]
         if before.get(symbol) == value or kind.quantity is not None:

@@ -1,4 +1,4 @@
-"""Schedules of plans for the public functions: the test whether a plan needs a schedule, and schedules as text and JSON."""
+"""Functions about schedules: they test whether a plan needs a schedule, and return schedules as text and JSON."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Minimise: TypeAlias = Literal["makespan", "cost", "steps"]
 """The quantity that planning minimises."""
 MINIMISE: tuple[Minimise, ...] = ("makespan", "cost", "steps")
 WIDTH = 72
-"""Number of characters that represent the makespan in a lane."""
+"""Length of a lane, which represents the makespan, in characters."""
 MOST_CRITICAL = 12
 """Maximum number of listed steps of the critical path."""
 
@@ -41,19 +41,19 @@ def with_unit_costs(problem: Problem) -> Problem:
 
 
 def asks_for_times(problem: Problem, minimise: str | None) -> bool:
-    """Return whether a plan needs a schedule, because its makespan is minimised or the task has deadlines, windows or events."""
+    """Return whether a plan needs a schedule: its makespan is minimised, or the task has deadlines, time windows or events."""
     times = problem.times
     return minimise == "makespan" or (times is not None and bool(times.deadlines or times.windows or times.events))
 
 
 def has_times(problem: Problem) -> bool:
-    """Return whether a behaviour has a duration, or the task has deadlines, windows or events."""
+    """Return whether a behaviour has a duration, or the task has deadlines, time windows or events."""
     durations = any(behavior.timing is not None for behavior in problem.domain.behaviors.values())
     return durations or asks_for_times(problem, None)
 
 
 def concurrent(problem: Problem, deadline: Deadline) -> tuple[Outcome, TimedPlan | None]:
-    """Plan with steps that must overlap in time; return the outcome and the schedule."""
+    """Plan with steps that overlap in time where necessary; return the outcome and the schedule."""
     from confab.planner.timed.concurrent import plan
 
     outcome, timed = plan(problem, Limits(seconds=deadline.left))
@@ -80,7 +80,7 @@ def needs_others_meanwhile(problem: Problem) -> bool:
 
 
 def may_overlap_by_need(problem: Problem) -> bool:
-    """Return whether a condition or effect is at the begin or end of a step, so that overlapping steps may reach more goals."""
+    """Return whether a condition or effect concerns the start or end of a step. Overlapping steps may then reach more goals."""
     return any(
         span is not Span.THROUGHOUT
         for behavior in problem.domain.behaviors.values()

@@ -36,7 +36,7 @@ def trajectories(scene: Scene, plan: AnyPlan | None = None, seed: int = 0, both_
     seed : int
         Seed of the rollout.
     both_hands : bool
-        Execute the plan with all hands at once, so that the times of primitives overlap.
+        Whether to execute the plan with all hands at once; the times of primitives then overlap.
 
     Returns
     -------
@@ -115,7 +115,7 @@ def _yaml(value: Any, indent: int = 0) -> Iterator[str]:
 
 
 def _flow(value: Any) -> str:
-    """Return a value in YAML's flow style. Numbers have no exponents, since YAML 1.1 reads 1e-05 as a text."""
+    """Return a value in YAML's flow style. Numbers are written without exponents, since YAML 1.1 reads 1e-05 as a text."""
     if isinstance(value, float):
         return f"{value:.9f}".rstrip("0") + "0" * value.is_integer()
     if isinstance(value, Mapping):

@@ -22,7 +22,7 @@ from confab.reasoner.sentences import said
 from confab.reasoner.symbols import Condition, Fact, Problem
 
 RETRIES = 5
-"""Number of failures after which an exported tree fails; after each earlier failure, the tree starts again."""
+"""An exported tree fails after this number of failures; after each earlier failure, it starts again."""
 
 RESERVED = {
     "ID",
@@ -52,11 +52,11 @@ RESERVED |= {
 
 @dataclass(frozen=True)
 class Element:
-    """A node of a behaviour tree, of a kind that BehaviorTree.CPP and py_trees support.
+    """A node of a behaviour tree; BehaviorTree.CPP and py_trees support its kind.
 
-    The kinds are Fallback, Sequence, Once, Parallel, SubTree, Check, Set, Again, Condition and Action. Fallback and Sequence
-    begin with their first child in each tick. Once is a sequence that resumes at the running child. `name` is the name of a
-    subtree, of a leaf, or of a mark (the flag of a finished step). `key` identifies a leaf.
+    The kinds are Fallback, Sequence, Once, Parallel, SubTree, Check, Set, Again, Condition and Action. The nodes Fallback and
+    Sequence begin with their first child in each tick. A node Once is a sequence that resumes at the running child. `name` is the
+    name of a subtree, of a leaf, or of a mark, which is the flag of a finished step. `key` identifies a leaf.
     """
 
     kind: str
@@ -70,8 +70,8 @@ class Element:
 class Tree:
     """The behaviour tree of a plan.
 
-    `subtrees` has the subtrees by name, with the whole tree first. `leaves` has the condition or the primitive of each leaf by
-    key. `possible` has the names of leaves that check the preconditions of a primitive.
+    `subtrees` has the subtrees by name, with the whole tree first. `leaves` has the condition or the primitive of each leaf, by
+    the leaf's key. `possible` has the names of the leaves that check the preconditions of a primitive.
     """
 
     subtrees: Mapping[str, Element]
@@ -140,7 +140,7 @@ class _Lowering:
                 return Element("Parallel", children=tuple(map(self.lowered, nodes)))
             case Subtree(name, child):
                 own = _identifier(name)  # names can't have spaces in the libraries
-                self.subtrees[own] = Element("")  # reserves a place before nested subtrees
+                self.subtrees[own] = Element("")  # the entry keeps the subtree before its nested subtrees
                 self.subtrees[own] = self.lowered(child)
                 return Element("SubTree", own)
 
@@ -169,7 +169,7 @@ def _mark(path: tuple[int, ...]) -> str:
 
 
 def _identifier(name: str) -> str:
-    """Return an identifier of letters, digits and underscores that BehaviorTree.CPP and py_trees accept and don't reserve."""
+    """Return an identifier of letters, digits and underscores that isn't a reserved name of BehaviorTree.CPP or py_trees."""
     found = re.sub(r"\W+", "_", name).strip("_")
     found = f"_{found}" if found[:1].isdigit() else found
     return f"{found}_" if found in RESERVED or keyword.iskeyword(found) else found
@@ -305,7 +305,7 @@ def _python(element: Element, names: Mapping[str, str], depth: int) -> str:
 def filled(
     tree: Tree, path: Path, problem: Problem, world: World, observer: Callable[[Step], None] | None = None
 ) -> Any:
-    """Return the root of an exported ``tree.py`` whose leaves observe a world and execute primitives in it.
+    """Return the root of an exported ``tree.py``. The leaves of the tree observe a world and execute primitives in this world.
 
     Parameters
     ----------
@@ -316,7 +316,7 @@ def filled(
     problem : Problem
     world : World
     observer : callable, optional
-        Called with each primitive before it is executed.
+        A function that is called with each primitive before the primitive is executed.
     """
     from py_trees.behaviour import Behaviour
     from py_trees.common import Status
@@ -347,7 +347,7 @@ def filled(
 
 
 def ticked(root: Any, most: int = 10_000) -> bool:
-    """Tick the root of a tree until it succeeds or fails, at most `most` times; return whether the tree succeeded."""
+    """Tick the root of a tree until the tree succeeds or fails, at most `most` times; return whether the tree has succeeded."""
     from py_trees.common import Status
 
     for _ in range(most):

@@ -14,7 +14,7 @@ PAUSE = 0.3
 
 
 def again_and_again(files: Sequence[str | Path], pause: float = PAUSE) -> Iterator[None]:
-    """Yield None after each change of ontology files or their imports; the iterator never ends."""
+    """Yield None whenever ontology files or their imports have changed; the iterator never ends."""
     watched = _with_imports(files)
     seen = _stamps(watched)
     while True:

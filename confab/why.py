@@ -1,4 +1,4 @@
-"""Sentences that explain why a step is in a plan, and why an alternative isn't (`Result.why`, `Result.why_not`)."""
+"""Sentences that explain why a step is in a plan (`Result.why`), and why an alternative isn't in the plan (`Result.why_not`)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from confab.reasoner.symbols import Behavior, Fact, Problem, Symbol
 from confab.worded import worded_behavior, worded_fact
 
 MOST_TOLD = 12
-"""Maximum number of facts of one kind in the text about a certificate."""
+"""Maximum number of facts of one kind that the text about a certificate lists."""
 
 if TYPE_CHECKING:
     from rich.tree import Tree
@@ -111,9 +111,9 @@ class Because:
 class WhyNot:
     """The reasons why an alternative isn't in the plan.
 
-    `answer` is the answer as a sentence. `lacks` has the failing conditions of an inapplicable alternative. `plan` is a
-    complete plan with the alternative, if one was found. `more` is the additional cost of this plan. `breaks` has the
-    conditions of upper levels that this plan violates and the present plan doesn't violate.
+    `answer` is the answer as a sentence. If the alternative is inapplicable, `lacks` has its failing conditions. If a complete
+    plan with the alternative was found, it is in `plan`, and `more` is the additional cost of this plan. If this plan violates
+    conditions of upper levels that the present plan doesn't violate, `breaks` has these conditions.
     """
 
     asked: str
@@ -345,17 +345,17 @@ def why_not(
     Parameters
     ----------
     asked : str
-        The alternative: a goal, or a behaviour. A goal is a fact like ``cup2 LOCATION location8``, which may be
-        followed by ``by hand2``, an individual that must take part in the changes of the fact. A behaviour has
-        arguments in the order of its parameters, as in ``B2_PICK right_hand cup1``, or by name, as in ``B2_PICK
-        hand=right_hand``. Sentences of explanations, such as ``pick cup 1 with right hand``, are also accepted.
+        The alternative: a goal, or a behaviour. A goal is a fact like ``cup2 LOCATION location8``. It may be followed by ``by
+        hand2``: the individual ``hand2`` must then take part in the changes of the fact. A behaviour has arguments in the order
+        of its parameters, as in ``B2_PICK right_hand cup1``, or by name, as in ``B2_PICK hand=right_hand``. Sentences of
+        explanations, such as ``pick cup 1 with right hand``, are also accepted.
     problem, plan
         The problem and its plan.
     labels : Labels
     ask, replan : callable
         Functions that plan: `ask` plans in a given problem, and `replan` plans in the scene for other goals.
     instead : Step, optional
-        The step that the behaviour replaces.
+        The step that the behaviour would replace.
 
     Raises
     ------
@@ -487,7 +487,7 @@ def _planned(asked: str, what: str, problem: Problem, plan: Plan, labels: Labels
 
 
 def _breaks(problem: Problem, plan: Plan, other: Plan, labels: Labels) -> tuple[str, ...]:
-    """Return, as sentences, the conditions of levels that the plan `other` violates and that the plan `plan` meets."""
+    """Return, as sentences, the conditions of levels that the plan `other` violates but the plan `plan` meets."""
     first = problem.domain.levels[0]
     if all(step.level == first for step in other.steps):
         return ()  # every level has steps

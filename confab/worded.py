@@ -1,4 +1,4 @@
-"""Behaviours and facts that are given in the words of their labels, as explanations print them."""
+"""Recognition of behaviours and facts that are written in the words of their labels, as in explanations."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from confab.reasoner.symbols import FALSE, TRUE, Behavior, Fact, Problem, Symbol
 
 
 def worded_behavior(problem: Problem, labels: Labels, text: str) -> tuple[Behavior, Mapping[str, str]] | None:
-    """Return the behaviour whose sentence is a text, with the individuals of its roles, or None if no sentence matches.
+    """Return the behaviour that a text expresses as a sentence, with the individuals of its roles, or None.
 
     Roles that the text doesn't mention have no individual.
     """
@@ -26,7 +26,7 @@ def worded_behavior(problem: Problem, labels: Labels, text: str) -> tuple[Behavi
 
 
 def worded_fact(problem: Problem, labels: Labels, text: str) -> Fact | None:
-    """Return the fact whose sentence is a text, or None if there is no such fact."""
+    """Return the fact that a text expresses as a sentence, or None if there is no such fact."""
     asked = _with_labels(problem, labels, text)
     for situation in problem.domain.situations.values():
         pools = [list(_mentioned(problem, labels, asked, kind)) for kind in situation.arguments]

@@ -20,11 +20,13 @@ from confab.scene import load
 from confab.sim.robots.transport import Model, RobotError
 
 MODEL, LINK = "https://w3id.org/confab/model#", "https://w3id.org/confab/model/link#"
-"""Namespaces of the properties for the fields of a world model: fields with literals, and fields that name an entity."""
+"""Namespaces of the properties for the fields of a world model: the first for fields with literals, the second for fields that
+name an entity.
+"""
 
 DCTERMS = "http://purl.org/dc/terms/"
 WORLD_FILES = {".yaml": "pyrobosim", ".yml": "pyrobosim"}
-"""The name of the interface that reads a world file, by the file's suffix."""
+"""The name of the interface that reads a world file, indexed by the suffix of the file."""
 
 
 def scene_of_world(on: str, path: Path, seed: int = 0, title: str = "") -> int:

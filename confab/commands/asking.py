@@ -1,4 +1,4 @@
-"""The commands query, serve and mcp, which answer SPARQL queries, run an endpoint, and offer tools to agents."""
+"""The commands `query`, `serve` and `mcp`: they answer SPARQL queries, run an endpoint, and offer tools to agents."""
 
 from __future__ import annotations
 

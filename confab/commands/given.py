@@ -47,7 +47,7 @@ def warn_of_errors(scene: Scene, deadline: Deadline) -> None:
 
 
 def blame_reach(scene: Scene, outcome: Outcome, deadline: Deadline) -> None:
-    """If there is no plan and time is left, print each place that no hand reaches, and the obstacle."""
+    """If there is no plan and time is left, print each place that no hand reaches, with the obstacle."""
     if outcome.plan is None and deadline.left != 0:
         from confab.reaching import unreached
         from confab.reasoner.limits import LimitError, within
@@ -62,7 +62,7 @@ NAMED = 3
 
 
 def memory_for(path: Path | None, none: bool, scene: Scene) -> Memory | None:
-    """Return the memory in a file, or None if no file is given or the file can't be read."""
+    """Return the memory in a file; return None if no file is given, or if the file can't be read."""
     if path is not None and none:
         raise KnowledgeError("--memory and --no-memory exclude each other; give one")
     if path is None:
@@ -95,7 +95,7 @@ def json_file(path: Path) -> Path:
 
 
 def plan_in(path: Path, scene: Scene) -> Plan:
-    """Return the plan in a file, which contains Confab's JSON or a PDDL planner's list of actions for an exported level."""
+    """Return the plan in a file with Confab's JSON, or with a PDDL planner's list of actions for an exported level."""
     if path.suffix.lower() in (".json", ""):
         from confab.interchange import read_plan
 

@@ -144,7 +144,7 @@ def show(memory: str, most: int, as_json: bool) -> None:
 
     loaded = Memory.load(memory)
     name = loaded.scene.rpartition("/")[2]
-    if name in scenes():  # the labels of a shipped scene are available
+    if name in scenes():  # a shipped scene provides the labels
         loaded = Memory.load(memory, load_scene(name))
     if as_json:
         rules, also = loaded.advice(most).records(), loaded.also()[:most]

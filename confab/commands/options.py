@@ -16,7 +16,7 @@ from confab.reasoner.files import STDOUT
 from confab.reasoner.kinds import CONVERTED, EPISODE, GENERATED, IMPORTED, PLAN, VERDICTS
 
 TEXTS = ("", PLAN, VERDICTS, EPISODE, GENERATED, IMPORTED, CONVERTED)
-"""Kinds of content that a command can write to standard output; the empty text is the kind of query results."""
+"""Kinds of content that a command can write to standard output. The empty text stands for query results."""
 
 STDIN = Path("/dev/stdin")
 
@@ -37,7 +37,7 @@ FOLDER = click.Path(path_type=Path)
 
 
 class Output(click.Path):
-    """A file that a command writes, or ``-`` for standard output, to which only content of the kinds in `TEXTS` may go.
+    """A file that a command writes, or ``-`` for standard output; only content of the kinds in `TEXTS` can go to standard output.
 
     Parameters
     ----------
@@ -66,10 +66,10 @@ class Output(click.Path):
 
 
 class Command(click.Command):
-    """A command that refuses one file as input and output, one file for two outputs, and stdin for two inputs."""
+    """A command that refuses to use one file as input and output, one file for two outputs, or stdin for two inputs."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Parse the arguments; errors of the parser know the command, so that they name its help."""
+        """Parse the arguments. An error of the parser knows the command, so that its message can refer to the command's help."""
         try:
             return super().parse_args(ctx, args)
         except click.UsageError as error:
@@ -135,7 +135,7 @@ def _verbose(context: click.Context, option: click.Parameter, wanted: bool) -> N
 
 
 def scene_names(context: click.Context, option: click.Parameter, begun: str) -> list[str]:
-    """Return the completions of the beginning of a scene argument: names of shipped scenes, folders and ontology files."""
+    """Return the completions of a scene argument whose beginning is given: shipped scenes, folders and ontology files."""
     folder = Path(begun.rpartition("/")[0] or ("/" if begun.startswith("/") else "."))
     found = sorted(folder.glob(f"{glob.escape(begun.rpartition('/')[2])}*"))
     files = [str(path) + "/" * path.is_dir() for path in found if path.is_dir() or path.suffix in ontology.SUFFIXES]

@@ -130,7 +130,7 @@ def plan(
     if out is not None:
         told(result.save(out), summary(result.outcome))
     else:
-        # Only a plan is printed with rich, whose import takes time: without a plan, the time limit may be over.
+        # The library rich, whose import takes time, prints only plans: without a plan, the time limit may be over.
         show_result(result.json() if as_json else result if result.solved else str(result))
     if dearer := result.dearer():
         remark(dearer)
@@ -238,7 +238,7 @@ def verify(
             done=done,
             gui=gui,
         )
-    if not (perturb or noise):  # a deviation of one rollout says nothing about the scene
+    if not (perturb or noise):  # with perturbations, a failure in one rollout says nothing about the scene
         keep(loaded, refuted_in(loaded, report))
     if out is not None:
         from confab.reasoner.files import write_whole
@@ -345,11 +345,13 @@ def execute(
             noise=noise,
             both_hands=both_hands,
         )
-    exact = on is None and not (perturb or noise)  # only then do refutations follow from the scene's geometry
+    exact = on is None and not (perturb or noise)  # only in this world do refutations follow from the scene's geometry
     if execution.episode.refuted and exact:
         from confab.refuting import keep
 
-        met = {found.individual for found, _ in execution.episode.discovered}  # unknown to later calls
+        met = {
+            found.individual for found, _ in execution.episode.discovered
+        }  # later calls don't know these individuals
         keep(loaded, [one for one in execution.episode.refuted if met.isdisjoint(one.individuals)])
     if learn and memory is not None:
         with undisturbed(memory):  # other processes may have changed the file during the episode
@@ -464,7 +466,7 @@ def _explained(
 
 
 def _by_memory(result: Result, memory: Memory, which: str, against: str | None, plot: Path | None) -> Explanation:
-    """Return why memory prefers a step of a plan to an alternative; draw the reasons into `plot` if given."""
+    """Return why memory prefers a step of a plan to an alternative; if `plot` is given, draw the reasons into this file."""
     from confab.explaining import explain as explain_step
     from confab.interchange import ground_named
     from confab.why import find_step

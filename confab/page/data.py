@@ -59,11 +59,11 @@ def page_data(
     report : Report, optional
         The verification of the plan in physics.
     execution : Execution, optional
-        The execution of the task, which the page shows instead of the plan.
+        The execution of the task; the page shows the execution instead of the plan.
     learned : Memory, optional
         The memory after the run.
     again : str, optional
-        The command that repeats the run; by default it is derived from the other arguments.
+        The command that repeats the run; by default, a command that fits the other arguments.
     """
     from confab.show import summary
 
@@ -137,7 +137,7 @@ def timeline_data(
     notes : mapping of path to str
         Notes on steps, by the step's path.
     reasons : bool
-        Whether to state the purpose of each step. The plan must be valid.
+        Whether to state the purpose of each step; this requires a valid plan.
     """
     rows, hidden = rows_of(timeline, labels)
     data: PageData = {
@@ -215,6 +215,6 @@ def _steps(timeline: Timeline, labels: Labels, notes: Mapping[tuple[int, ...], s
 
 
 def _measured(step: Step, bar: Bar | None, labels: Labels) -> list[tuple[str, str]]:
-    """Return the names and values of a primitive's measurements, and of the variables that the state determines for a step."""
+    """Return names and values: the measurements of a primitive, and the variables that the state determines for a step."""
     pairs = [measurement(name, value) for name, value in (bar.measured if bar else {}).items()]
     return [*pairs, *((spaced(name), labels.name(value)) for name, value in step.bindings.items())]

@@ -14,7 +14,7 @@ from confab.reasoner.graph.knowledge import KnowledgeError
 
 
 def page_html(data: Mapping[str, object] | PageData | None, title: str) -> str:
-    """Return the page as HTML text with embedded data. If `data` is None, the page requests its data from the server."""
+    """Return the page as HTML text with embedded data. Without `data`, the page requests its data from the server."""
     content = json.dumps(data, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
     return Template(asset("page.html")).substitute(
         title=escape(title), style=asset("page.css"), data=content, script=script()

@@ -1,4 +1,4 @@
-"""The background of the map: places, areas and robots by their coordinates, or a layout of places without coordinates."""
+"""The background of the map: places, areas and robots at their coordinates, or a computed layout of places without coordinates."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MOST_SPOTS = 400
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 """Pattern of a coordinate in well-known text."""
 STRETCH = 1.7
-"""Horizontal stretch of a layout of connected places, since pages and names are wider than high."""
+"""Factor by which a layout of connected places is stretched horizontally, since pages and names are wider than high."""
 
 
 @dataclass(frozen=True)
@@ -48,8 +48,9 @@ class Ground:
 def ground_of(problem: Problem, embodiment: Embodiment | None, shapes: Iterable[tuple[str, str]] = ()) -> Ground | None:
     """Return the background of the map, or None if the problem has no places.
 
-    Places are positioned by their coordinates if available, otherwise by static relations that connect them, otherwise in rows.
-    A map of more than `MOST_SPOTS` places has no places, and its note states the reason.
+    Places are drawn at their coordinates. Without coordinates, places that static relations connect are drawn near each other;
+    other places are drawn in rows. If there are more than `MOST_SPOTS` places, the map shows no places, and its note states the
+    reason.
 
     Parameters
     ----------
@@ -68,7 +69,7 @@ def _too_many(number: int) -> Ground:
 
 
 def _furnished(embodiment: Embodiment) -> Ground:
-    """Return furniture and places of an embodiment as the film shows them, with the camera opposite the robots."""
+    """Return the furniture and places of an embodiment in the view of the film, whose camera is opposite the robots."""
     if len(embodiment.places) > MOST_SPOTS:
         return _too_many(len(embodiment.places))
     from confab.sim.linkage import with_open_mechanisms
@@ -108,7 +109,10 @@ def _furnished(embodiment: Embodiment) -> Ground:
 
 
 def _drawn(shapes: Iterable[tuple[str, str]]) -> Ground | None:
-    """Return the polygons and points of shapes, or None. An individual without a point is at the mean of its polygon's corners."""
+    """Return the polygons and points of shapes, or None.
+
+    An individual without a point is drawn at the mean of its polygon's corners.
+    """
     spots: dict[str, Point] = {}
     areas: list[Area] = []
     for name, text in shapes:
@@ -129,7 +133,7 @@ def _drawn(shapes: Iterable[tuple[str, str]]) -> Ground | None:
 
 
 def _connected(problem: Problem) -> Ground | None:
-    """Return a layout of at least three places in which static relations connect near places, or None."""
+    """Return a layout in which static relations connect near places. Return None for fewer than three places."""
     import networkx
 
     values = _values(problem)
@@ -151,7 +155,7 @@ def _connected(problem: Problem) -> Ground | None:
 
 
 def _in_order(problem: Problem) -> Ground | None:
-    """Return rows of at least three places without coordinates and connections, ordered by name, or None."""
+    """Return a layout of the places in rows, ordered by name. Return None for fewer than three places."""
     kinds = {
         problem.domain.situations[symbol.situation].range
         for symbol in problem.initial

@@ -14,13 +14,15 @@ if TYPE_CHECKING:
     from confab.labels import Labels
 
 MOST_FIXED = 5000
-"""Maximum number of rows for symbols that neither change nor have a goal. For more symbols, the page states their number."""
+"""Maximum number of rows for symbols that neither change nor have a goal. If there are more symbols, the page states only their
+number.
+"""
 LAST = 0.04
-"""Extension of the time axis after the last primitive, as a share of the plan's duration, to show the last effects."""
+"""Extension of the time axis after the last primitive, which shows the last effects, as a share of the plan's duration."""
 
 
 def axis_end(timeline: Timeline) -> float:
-    """Return the end of the time axis. If the last primitive has an effect, the axis ends after the primitive."""
+    """Return the end of the time axis. If the last primitive has an effect, the axis extends beyond the end of the primitive."""
     late = any(period.begin >= timeline.end for periods in timeline.phases.values() for period in periods[1:])
     return round((timeline.end or 1.0) * (1 + LAST if late else 1), 4)
 
@@ -59,7 +61,7 @@ def rows_of(timeline: Timeline, labels: Labels) -> tuple[list[Row], int]:
 
 
 def _lanes(group: str, label: str, bars: Sequence[Bar], labels: Labels) -> list[Row]:
-    """Distribute bars over the smallest number of rows in which no two bars overlap."""
+    """Distribute bars over rows in which no two bars overlap; the number of rows is minimal."""
     rows: list[list[Bar]] = []
     for bar in sorted(bars, key=lambda bar: (bar.begin, bar.end)):
         free = next((row for row in rows if row[-1].end <= bar.begin + 1e-6), None)
@@ -94,7 +96,7 @@ def _interval(bar: Bar, labels: Labels) -> Interval:
 
 
 def tone_of(timeline: Timeline, symbol: Symbol, value: str) -> str:
-    """Return the meaning of a value's colour: goal value (``wanted``), initial value (``start``) or another value (``between``)."""
+    """Return the meaning of a value's colour: ``wanted`` (goal value), ``start`` (initial value) or ``between``."""
     if timeline.problem.goal.get(symbol) == value:
         return "wanted"
     return "start" if timeline.problem.initial.get(symbol, FALSE) == value else "between"

@@ -1,4 +1,4 @@
-"""A running execution on the page: the executed steps with times of the world's clock, and the remaining steps of the plan."""
+"""A running execution on the page: the executed steps, timed by the world's clock, and the remaining steps of the plan."""
 
 from __future__ import annotations
 

@@ -18,7 +18,9 @@ class Markup(str):
 
 
 def tag(name: str, *inner: object, **attributes: object) -> Markup:
-    """Return an HTML element. Attributes that are None or False are omitted. Names like ``class_``, ``data_x`` may be used.
+    """Return an HTML element.
+
+    Attributes that are None or False are omitted. Attributes may have names like ``class_`` and ``data_x``.
 
     >>> tag("p", "a < b ", tag("b", "yes"), class_="note", title=None)
     '<p class="note">a &lt; b <b>yes</b></p>'
@@ -52,7 +54,7 @@ def number(value: float) -> str:
 
 
 UNITS = {"m": ("mm", 1000.0), "rad": ("°", 180 / pi), "n": ("N", 1.0), "s": ("s", 1.0)}
-"""The unit and the factor in which a measurement is displayed, by the ending of its name."""
+"""The unit and the factor with which the page displays a measurement, by the ending of the measurement's name."""
 MEASURED = re.compile(r" \(\w+ [-\d.e+]+(, \w+ [-\d.e+]+)*\)$")
 
 
@@ -96,5 +98,5 @@ def script() -> str:
 
 
 def styled(*pieces: object) -> str:
-    """Return pieces of HTML with their style sheet, isolated from the style of the surrounding notebook."""
+    """Return pieces of HTML with their style sheet, so that the style of the notebook doesn't affect them."""
     return str(tag("div", tag("style", Markup(asset("page.css"))), *pieces, class_="confab"))

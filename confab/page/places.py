@@ -32,9 +32,9 @@ def map_of(ground: Ground, timeline: Timeline, labels: Labels) -> MapData:
 def _things(ground: Ground, timeline: Timeline, labels: Labels) -> list[Thing]:
     """Return the objects on the map, each with its places in time.
 
-    The place of an object is the value of a symbol whose first value is on the map. The symbol's situation type must have no
-    rest value, which excludes the positions of hands. If an object has several symbols of this kind, the symbol whose values
-    are on the map for the longest time is used.
+    The place of an object is the value of one of its symbols: the first value of the symbol is a place on the map, and its
+    situation type has no rest value. (Positions of hands have a rest value.) Of several such symbols, the symbol whose values are
+    on the map for the longest time is used.
     """
     situations = timeline.problem.domain.situations
     found: dict[str, tuple[float, Thing]] = {}

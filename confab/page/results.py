@@ -39,7 +39,7 @@ class Planned(Protocol):
     timed: TimedPlan | None
 
     def dearer(self) -> str:
-        """Return the known bound on the cost of a cheaper plan, as text."""
+        """Return a remark on possible cheaper plans, as `confab.planning.Result.dearer`."""
 
 
 class Executed(Protocol):
@@ -159,7 +159,7 @@ def _proof(outcome: Outcome, labels: Labels) -> list[str]:
 
 
 def film_of(report: Report | None) -> Film | None:
-    """Return the film of a verification with its first still as the poster, or None if there is no film."""
+    """Return the film of a verification, with the first still picture as its poster; return None if there is no film."""
     if report is None or report.video is None or not report.video.is_file():
         return None
     kind = "image/gif" if report.video.suffix == ".gif" else "video/mp4"
@@ -227,7 +227,7 @@ def again_of(scene: Known, problem: Problem, report: Report | None, execution: E
 
 
 def small_print_of(outcome: Outcome | None) -> list[str]:
-    """Return notes on levels without a refinable plan, and on the conditions of these levels that the plan violates."""
+    """Return notes on the levels on which no plan can be refined, and on the conditions of these levels that the plan violates."""
     if outcome is None:
         return []
     broken = [broken.text for left in outcome.left for broken in left.broken]

@@ -11,8 +11,7 @@ FORMAT = 1
 class Interval(TypedDict, total=False):
     """A bar in a row of the timeline: a step or a value, its times, and the meaning of its colour (`tone`).
 
-    `step` is the ID of the step. `slack` is the duration by which the end of the step may be delayed without delaying the end
-    of the plan.
+    `step` is the ID of the step. The end of the step may be delayed by `slack` without delaying the end of the plan.
     """
 
     begin: float
@@ -27,8 +26,8 @@ class Interval(TypedDict, total=False):
 class Row(TypedDict, total=False):
     """A row of the timeline.
 
-    The text `group` is ``levels``, ``actors``, ``changes``, ``wanted`` or ``fixed``. The flag `met` states whether the symbol
-    has its goal value in the end.
+    The row's `group` is ``levels``, ``actors``, ``changes``, ``wanted`` or ``fixed``. For a symbol, `met` tells whether the
+    symbol has its goal value in the end.
     """
 
     group: str
@@ -38,7 +37,10 @@ class Row(TypedDict, total=False):
 
 
 class StepData(TypedDict, total=False):
-    """A step of the plan. The step's ID is the path joined by dots, so the ID begins with the parent step's ID."""
+    """A step of the plan.
+
+    The step's ID consists of the numbers of its path, joined by dots; it therefore begins with the ID of the parent step.
+    """
 
     id: str
     number: str
@@ -101,8 +103,7 @@ class Alarm(TypedDict, total=False):
 class Film(TypedDict, total=False):
     """A film of the run.
 
-    `speed` is the ratio of simulated time to the film's time. `poster` is the picture that the page shows before the film is
-    played.
+    `speed` is the ratio of simulated time to the film's time. The page shows the picture `poster` before the film is played.
     """
 
     source: str
@@ -156,7 +157,10 @@ class TurnableRow(TypedDict):
 
 
 class Turnable(TypedDict):
-    """All symbols whose values the user can change, and the lists of values by name. Each value has a label."""
+    """All symbols whose values the user can change, and the lists of their possible values.
+
+    Each list has a name; each value has a label.
+    """
 
     rows: list[TurnableRow]
     values: dict[str, list[tuple[str, str]]]
@@ -172,7 +176,7 @@ class ReadyQuery(TypedDict):
 
 
 class PageData(TypedDict, total=False):
-    """The content of the page. `problem` is the reason why planning failed after a change on the page."""
+    """The content of the page. If planning failed after a change on the page, `problem` is the reason."""
 
     format: int
     title: str

@@ -1,4 +1,4 @@
-"""Controls on the page, by which the user changes facts, goals and interventions, and the resulting plans."""
+"""Controls on the page, with which the user changes facts, goals and interventions, and the plans that result from the changes."""
 
 from __future__ import annotations
 
@@ -28,13 +28,15 @@ if TYPE_CHECKING:
     from confab.reasoner.graph.knowledge import KnowledgeGraph
 
 MOST_SYMBOLS = 20_000
-"""Maximum number of symbols that the user can change on the page. For more symbols, the page states their number."""
+"""Maximum number of symbols that the user can change on the page. If there are more symbols, the page states only their
+number.
+"""
 SECONDS = 10.0
 """Time limit of planning for the page in seconds."""
 
 
 class TurnedIntervention(TypedDict):
-    """An intervention from the page: the ID of the step before it, its kind (world or goal), and the symbol with the new value."""
+    """An intervention from the page: the ID of the step before it, its kind (world or goal), the symbol and the new value."""
 
     after: str | int
     what: str
@@ -43,7 +45,10 @@ class TurnedIntervention(TypedDict):
 
 
 class Turned(TypedDict, total=False):
-    """Values of facts and goals that a user has changed on the page, by the words of the symbol. The value None removes a goal."""
+    """The values of facts and goals that a user has changed on the page; a key has the words of the symbol.
+
+    The value None removes a goal.
+    """
 
     facts: dict[str, str]
     goals: dict[str, str | None]
@@ -135,7 +140,7 @@ class Sheet:
         return turned
 
     def _checked(self, key: str, value: object) -> str:
-        """Return a value of a symbol; raise `KnowledgeError` if the value is invalid. Any text is accepted as an amount."""
+        """Return a value of a symbol; raise `KnowledgeError` if the value is invalid. For an amount, any text is accepted here."""
         symbol = self.symbols[key]
         situation = self.problem.domain.situations[symbol.situation]
         known = self._values(symbol)
@@ -177,7 +182,7 @@ class Sheet:
         return data
 
     def answer(self, by: Turned) -> PageData:
-        """Return the content of the page after a change of controls. If planning fails, the content has only the reason."""
+        """Return the content of the page after a change of controls. If planning fails, the content is only the reason."""
         try:
             result = self.plan(by)
             execution = self.act(by, result)

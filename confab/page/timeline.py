@@ -1,7 +1,7 @@
 """The timeline of a run: the primitives of a plan and the values of symbols, with their begin and end times.
 
-In the timeline of a plan without a schedule, each primitive takes one unit of time. Rollouts and episodes have times of the
-world's clock.
+In the timeline of a plan without a schedule, each primitive takes one unit of time. The times of rollouts and episodes are those
+of the world's clock.
 """
 
 from __future__ import annotations
@@ -21,17 +21,18 @@ if TYPE_CHECKING:
     from confab.sim.verify import Rollout
 
 MOST_HANDS = 8
-"""Maximum number of lanes, where a lane has all primitives with the same first argument (such as a hand). With more
-first arguments, all primitives share one lane."""
+"""Maximum number of lanes. A lane has all primitives with the same first argument, such as a hand. If there are more first
+arguments, all primitives share one lane.
+"""
 
 
 @dataclass(frozen=True)
 class Bar:
     """A step with its begin and end times.
 
-    `ok` is the verdict on the step, or None without a verdict. `note` is a remark on the result of the step. `planned` is True
-    if the step hasn't begun. In a schedule, `actors` are the actors of the step, and `slack` is the duration by which the end
-    of the step may be delayed without a longer makespan.
+    `ok` is the verdict on the step; it is None if there is no verdict. `note` is a remark on the result of the step. `planned` is
+    True if the step hasn't begun. In a schedule, `actors` are the actors of the step, and the end of the step may be delayed by
+    `slack` without a longer makespan.
     """
 
     step: Step
@@ -79,9 +80,12 @@ class Timeline:
 
     @property
     def by_path(self) -> dict[tuple[int, ...], Bar]:
-        """The bars of all steps that have begun, by path. The bar of a step with sub-steps spans the bars of its primitives."""
+        """The bars of all steps that have begun, by path.
+
+        The bar of a step with sub-steps extends over the bars of its primitives.
+        """
         found: dict[tuple[int, ...], Bar] = {}
-        for bar in self.bars:  # several attempts at a step make one bar with the last result
+        for bar in self.bars:  # several attempts at a step become one bar with the result of the last attempt
             first = found.get(bar.step.path, bar)
             found[bar.step.path] = Bar(
                 bar.step, first.begin, bar.end, bar.ok, bar.note, bar.measured, bar.code, bar.planned
@@ -108,7 +112,7 @@ class Timeline:
         return found
 
     def lanes(self) -> dict[str, list[Bar]]:
-        """Return the bars of primitives by actor or worker (`schedule.worker_of`); if no step has a worker, by first argument."""
+        """Return the bars of primitives by actor or worker (`schedule.worker_of`), or by first argument if no step has a worker."""
         workers = workers_of(self.problem)
         found: dict[str, list[Bar]] = {}
         for bar in self.bars:
@@ -135,7 +139,10 @@ def of_plan(problem: Problem, plan: Plan) -> Timeline:
 
 
 def of_schedule(problem: Problem, timed: TimedPlan) -> Timeline:
-    """Return the timeline of a scheduled plan, with each effect at the end or the begin of a primitive, as the behaviour states."""
+    """Return the timeline of a scheduled plan.
+
+    Each effect is at the beginning or the end of a primitive, as the behaviour states.
+    """
     bars = tuple(
         Bar(slot.step, float(slot.begin), float(slot.end), actors=slot.actors, slack=float(slot.slack))
         for slot in timed.slots
@@ -166,7 +173,7 @@ def of_schedule(problem: Problem, timed: TimedPlan) -> Timeline:
 
 
 def of_rollout(problem: Problem, plan: Plan, rollout: Rollout) -> Timeline:
-    """Return the timeline of a rollout, in which the effects of a successful primitive begin at its end."""
+    """Return the timeline of a rollout. The effects of a successful primitive begin at the end of the primitive."""
     now = max(0.0, rollout.simulated_seconds - sum(report.seconds for report in rollout.steps))
     by_path = {step.path: step for step in plan.primitives}
     bars = []

@@ -1,4 +1,4 @@
-"""The page as a widget (anywidget) in a notebook. Python plans and answers the queries of the page."""
+"""The page as a widget (anywidget) in a notebook. The Python process plans, and answers the queries of the page."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MISSING = "the board needs anywidget, which isn't installed; pip install anywidg
 
 
 def board(scene: Known) -> anywidget.AnyWidget:
-    """Return the page of a scene as a widget for a notebook, whose property `result` is the current result of planning.
+    """Return the page of a scene as a widget for a notebook. The property `result` of the widget is the current result of planning.
 
     Raises
     ------
@@ -33,7 +33,10 @@ def board(scene: Known) -> anywidget.AnyWidget:
         raise KnowledgeError(MISSING) from error
 
     class Board(anywidget.AnyWidget):
-        """The widget, whose synchronised properties have the content, the user's changes, the queries and their results."""
+        """The widget.
+
+        Its properties, which are synchronised with the page, have the content, the user's changes, the queries and their results.
+        """
 
         _esm = script()
         _css = asset("page.css")
