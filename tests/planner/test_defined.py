@@ -141,7 +141,7 @@ def reachable(problem: Problem, most: int) -> tuple[list[State], bool]:
 
 
 def test_what_is_defined_is_worked_out_where_only_a_change_of_an_amount_asks_for_it() -> None:
-    """A cart leaves the shade before the bed becomes too dry; only a change of an amount depends on the shade."""
+    """The cart must leave the shade before WET falls below zero; only the change of this amount depends on the shade."""
     cart = Parameter("?c", "Cart")
     shaded = tuple(Rule("SHADED", (cart,), (), (has("AT", "?c", where),)) for where in ("shade", "porch"))
     takes = AmountEffect("WET", ("bed",), "decrease", Fraction(1), (has("SHADED", "cart", "true"),))

@@ -218,7 +218,7 @@ def test_random_tables_are_solvable_in_the_slice_if_in_the_world(seed: int, obje
 
 
 def test_a_slice_names_its_individuals_as_the_whole_scene_does(tmp_path: Path) -> None:
-    """A hand whose name equals the name of a role of physics stays ambiguous, even if the role isn't read."""
+    """A hand with the name of a role that only physics uses keeps its prefix, even if the role isn't read."""
     for name in ("scenes/one-arm-serving.ttl", "scenes/one-arm-serving.reach.ttl", "robots/one-arm.ttl"):
         text = (ROOT / name).read_text(encoding="utf-8").replace("confab/one-arm", "confab/one-hand")
         text = text.replace("r:gripper", "r:hand").replace("\n:gripper", "\n:hand")

@@ -157,7 +157,7 @@ def test_what_a_hand_carries_is_covered_down_to_its_lower_edge() -> None:
 
 
 def put_beside(attempt: Attempt, q: Array, gap: float) -> None:
-    """Put a post on the left of the hand, at the distance that the hand has in metres at some postures."""
+    """Put a post `gap` metres to the left of all postures `q` of an arm."""
     mover = attempt.hand.mover()
     centers, radii = mover.at(q).reshape(-1, 3), np.tile(mover.spheres.radii, len(q))
     left = int(np.argmax(centers[:, 1] + radii))
