@@ -56,7 +56,7 @@ def comparison(condition: Comparison, relations: Mapping[str, Rows], constant: C
 
 
 def change(effect: AmountEffect, relations: Mapping[str, Rows], constant: Constant) -> str:
-    """Return the call that changes the amount of an existing symbol in `amounts`."""
+    """Return the Python call that changes the amount of an existing symbol in `amounts`."""
     key, by = key_written(effect.arguments), amount(effect.amount, relations, constant)
     old = f"{identifier('now', effect.situation)}[{key}]"
     function = constant(("amounts", "changed"), changed)

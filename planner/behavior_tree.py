@@ -1,12 +1,12 @@
 """A plan as a reactive behaviour tree; if a disturbance undoes a step, the tree repeats the step.
 
 Each step becomes a fallback with two children: the first child tests whether the effects of the step already hold, and the
-second child tests the conditions of the step and executes the step. A required fact of the tree is a causal link between two
-primitives, or from a primitive to the goal (`confab.planner.causal_links`). A link is satisfied if the fact holds, or if the
-later primitive has been executed. Therefore a primitive is repeated if and only if a later primitive still requires its
-effects. At the beginning of each tick, the completed primitives are marked, from the last to the first. After each primitive
-the tree is ticked again. Steps are ticked in the order of the plan; sibling steps are parallel if they have different workers
-and their primitives neither require nor disturb one another. The steps below an abstract step are a subtree.
+second child tests the conditions of the step and executes the step. The facts that the tree must establish are those of causal
+links between two primitives, or from a primitive to the goal (`confab.planner.causal_links`). A link is satisfied if the fact
+holds, or if the later primitive has been executed. Therefore a primitive is repeated if and only if a later primitive still
+requires its effects. At the beginning of each tick, the completed primitives are marked, from the last to the first. After each
+primitive the tree is ticked again. Steps are ticked in the order of the plan; sibling steps are parallel if they have different
+workers and their primitives neither require nor disturb one another. The steps below an abstract step are a subtree.
 """
 
 from __future__ import annotations
@@ -45,14 +45,14 @@ class Do:
 
 @dataclass(frozen=True)
 class Marked:
-    """A condition leaf that succeeds if the step of a path was marked as done in this tick."""
+    """A condition leaf that succeeds if the step at a path was marked as done in this tick."""
 
     path: Path
 
 
 @dataclass(frozen=True)
 class Mark:
-    """A node that marks the step of a path as done if the node's child succeeds, otherwise as not done.
+    """A node that marks the step at a path as done if the node's child succeeds, otherwise as not done.
 
     The node itself always succeeds.
     """

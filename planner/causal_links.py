@@ -198,7 +198,8 @@ class _Course:
     def in_turn(self, step: Step) -> Iterator[tuple[Step, dict[Cell, str] | None]]:
         """Yield each of the steps that are refined together, with its changes in the state after the steps before it.
 
-        The changes of an inapplicable step are None, and no step follows it. At the end the facts are as before.
+        The changes of an inapplicable step are None, and no step follows it. Afterwards, the facts have their previous values
+        again.
         """
         mark = len(self.facts.log)
         for one in step.together:
@@ -330,7 +331,7 @@ class _Course:
             yield self.steps[written.by].path, Need(why, (FactChange(Fact(symbol, value), written.before),), path)
 
     def derivation_givers(self, cell: Cell, wanted: str) -> Iterator[tuple[Path, Need]]:
-        """Yield the steps that make the facts true from which a defined goal follows.
+        """Yield the steps that make true the facts from which a defined goal follows.
 
         A fact counts only if the derivation of the goal reads the fact, and the goal wouldn't hold without the fact.
         """
@@ -375,5 +376,5 @@ class _Course:
 
 
 def _least(steps: Sequence[Step]) -> int:
-    """Return the most abstract level of steps of the same parent."""
+    """Return the most abstract level among steps of the same parent."""
     return min((step.level for step in steps), default=0)

@@ -138,7 +138,7 @@ class _Causes:
         return ([goal], last[1]) if last else ([goal], Cause("no behaviour has this effect"))
 
     def causes(self, claim: Claim) -> list[Cause]:
-        """Return the cause that prevents each behaviour which could make a claim false, the simplest cause first."""
+        """For each behaviour that could make a claim false, return the cause that prevents it, the simplest cause first."""
         fact, free, lowest = claim.fact, dict(claim.kinds), self.lowest
         symbol, situation = fact.symbol, fact.symbol.situation
         if not free and not lowest.exists(situation, symbol.arguments):

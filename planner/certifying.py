@@ -42,7 +42,7 @@ from confab.reasoner.amounts import meets, number, written
 from confab.reasoner.symbols import FALSE, TRUE, AmountEffect, Behavior, Effect, Fact, Problem, State, Symbol
 
 WORK = 3_000_000
-"""Maximum work to find a certificate, as the number of tested conditions and of behaviours tried in a case."""
+"""Maximum work to find a certificate: the number of tested conditions plus the number of behaviours that are tried in cases."""
 LITTLE = 2_000, 20_000
 """Maximum number of tests per goal in the first and in the second round.
 
@@ -51,7 +51,7 @@ After the second round, all goals are examined with the full limit.
 PAIR, FEWER, SHARE = 100_000, 200_000, 0.5
 """Maximum number of tests for each pair of goals, and for removing symbols from a certificate.
 
-The last number is the share of the remaining tests that each kind of certificate may use.
+`SHARE` is the share of the remaining tests that each kind of certificate may use.
 """
 FEW = 3
 """Maximum number of distinguished values of a symbol; if more are needed, all its values are distinguished."""
@@ -91,7 +91,7 @@ def certify(problem: Problem, most: float = WORK, few_states: bool = False) -> C
 def of_kind(kind: str, problem: Problem, most: float = WORK) -> Certificate | None:
     """Return a certificate of one of the `KINDS`, found without the other kinds, or None.
 
-    In `certify`, the result of one kind can hide a fault of another kind.
+    In `certify`, a certificate of one kind can hide a fault in the search for another kind.
     """
     lowest = Lowest(problem, most)
     relaxed = Relaxed(lowest)
@@ -539,7 +539,7 @@ def _restless(problem: Problem, level: int, facts: Facts) -> list[Fact]:
 
 
 def _told_apart(cases: Cases, relaxed: Relaxed, wrong: Iterable[tuple[Symbol, str, bool]]) -> Certificate | None:
-    """Return a certificate that either claims that an assumed fact never holds, or distinguishes its value."""
+    """Return a certificate that either claims that an assumed fact never holds, or distinguishes the value of the fact."""
     certificate, lowest = cases.certificate, cases.lowest
     apart = dict(certificate.told_apart)
     impossible = []

@@ -31,8 +31,11 @@ Values: TypeAlias = "list[str]"
 Test: TypeAlias = "Callable[[Stated, Values], bool]"
 Candidates: TypeAlias = "Callable[[Stated, Values], Iterable[str]]"
 Lookups: TypeAlias = "dict[tuple[Witness, Arguments], set[Arguments]]"
-"""Lookups on which the result of a check depends: the individuals that initially satisfy the conditions of a witness,
-for each row of open terms."""
+"""Lookups on which the result of a check depends.
+
+For a witness and the values of its open terms, a lookup contains the individuals that initially satisfy the conditions of the
+witness.
+"""
 
 
 class Stated(Protocol):

@@ -40,7 +40,7 @@ def find(places: Sequence[Place], asked: int | str | Sequence[int | str], hint: 
     Parameters
     ----------
     places : sequence of Place
-        The places of all steps of a plan, each before those of its sub-steps.
+        The places of all steps of a plan; the place of a step comes before the places of its sub-steps.
     asked : int, str or path
         The step in one of these notations: the number of a step of the first level, counted from 0; ``L3#12`` for step 12 of
         level 3, counted from 0; a path like ``0.1.2``; or words of the step, also as a tuple.

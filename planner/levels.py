@@ -6,7 +6,7 @@ moved". This module lists the violated conditions.
 
 A level sees a change if a symbol of the level gets another value of the level. A level doesn't see intermediate values of lower
 levels, such as a cup in a hand. Each visible change that persists requires an applicable behaviour of the level that makes the
-change. The same behaviour may also make the visible changes that directly precede the change.
+change. A behaviour that makes a visible change may also make the visible changes directly before it.
 """
 
 from __future__ import annotations

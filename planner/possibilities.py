@@ -304,8 +304,8 @@ class Reading:
     def total(self, aggregate: Aggregate, arguments: tuple[str, ...]) -> Range:
         """Return the range of a sum or a count by its definition.
 
-        The number of a certain solution counts for both ends of the range. The number of a solution that is only possible
-        counts for one end, so that it widens the range.
+        If a solution certainly holds, its number is added to both ends of the range. If a solution only may hold, its number
+        can only widen the range.
         """
         key = aggregate.situation, arguments
         if key not in self._totals:

@@ -226,7 +226,7 @@ class _Check:
     def stated(self, step: Step) -> dict[Cell, str] | None:
         """Return the values that a step, or steps that are refined together, state; the facts are unchanged.
 
-        Steps that are refined together are applied one after another. Return None if one isn't applicable.
+        Steps that are refined together are applied one after another. Return None if one of the steps isn't applicable.
         """
         mark, exceptions = len(self.facts.log), dict(self.exceptions)
         wanted: dict[Cell, str] = {}
@@ -268,7 +268,7 @@ class _Check:
         return {(situation, key): value for situation, key, value in changes if situation not in remembers}
 
     def within_bounds(self, step: Step, level: int | None = None) -> bool:
-        """Return whether all totals are within their bounds and no constraint is violated after a step; record a violation.
+        """Return whether a step keeps all totals within their bounds and violates no constraint; if not, record the violation.
 
         If a level is given, only the totals and constraints that the level sees count.
 
@@ -430,7 +430,7 @@ class BehaviorReader:
     def remember(self, facts: Facts, level: int | None = None) -> None:
         """Make remembered symbols true if the symbols that they remember are true.
 
-        The method changes only symbols that the level sees; by default, it changes all.
+        If `level` is given, only the remembered symbols that the level sees are changed.
         """
         for name, source in self.problem.domain.remembers.items():
             if level is not None and self.problem.domain.situations[name].level > level:

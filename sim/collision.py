@@ -248,7 +248,7 @@ def column(heights: Array, radii: Array, bottom: float) -> Spheres:
 
 
 def rim(heights: Array, radii: Array) -> Spheres:
-    """Return small spheres along the lower edge of an upright body of revolution, which `column` leaves out."""
+    """Return small spheres along the lower edge of an upright body of revolution; `column` leaves out this edge."""
     wide = float(radii[0]) - EDGE
     around = np.linspace(0.0, 2 * np.pi, max(int(np.ceil(2 * np.pi * wide / BETWEEN)), 3), endpoint=False)
     centers = np.stack([wide * np.cos(around), wide * np.sin(around), 0 * around + heights[0] + EDGE], -1)

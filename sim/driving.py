@@ -31,7 +31,7 @@ RAMP_SECONDS = 0.8
 """Seconds in which a base reaches its speed; a faster start lets loads slip and full cups spill."""
 
 STOPPED_LAG = 0.03
-"""Minimum lag, in metres or radians, of a base behind its command at which the base counts as blocked."""
+"""A base counts as blocked if it lags behind its command by at least this distance in metres, or this angle in radians."""
 
 BACKING = (0.15, 0.3, 0.5, 0.8)
 """Distances in metres by which a robot backs off, tried in turn.

@@ -39,13 +39,13 @@ Bullet's default of 2 cm suits larger bodies. With the default, a finger that ha
 """
 
 LAG = 0.08
-"""Lag in radians of a joint behind its command above which a motion is stopped."""
+"""A motion is stopped if a joint lags behind its command by more than this angle in radians."""
 
 LOOKS = 6
 """Number of noisy measurements whose mean is a perceived position."""
 
 STEADY = 5.0
-"""Number of standard deviations of the perceived position within which a body counts as unmoved."""
+"""A body counts as unmoved within this number of standard deviations of its perceived position."""
 
 NEAR_PLACE = 0.05
 """Maximum distance in metres between a place and a body at the place."""

@@ -50,7 +50,7 @@ A primitive is shown by the camera that sees most of the primitive's objects.
 """
 
 ABOVE = 0.01
-"""Height in metres above a place, or above the top of an object, of the point that must be visible for a name to be shown."""
+"""A name is shown if a point at this height in metres above the place, or above the top of the object, is visible."""
 
 NEARLY = 0.97
 """A ray from a camera hits a handle if its first hit is at least at this share of the distance to the handle."""

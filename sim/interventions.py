@@ -45,7 +45,7 @@ def put(world: PhysicsWorld, name: str, base: Array, orientation: Sequence[float
 
 
 def push(world: PhysicsWorld, name: str, by: Sequence[float]) -> None:
-    """Shift a standing object with its contents by metres along x and y; a held object is not moved."""
+    """Shift a standing object with its contents by `by`, in metres along x and y; a held object is not moved."""
     if name in world.bodies and not any(world.held(hand) == name for hand in world.hands):
         orientation = pybullet.getBasePositionAndOrientation(world.bodies[name].body, physicsClientId=world.client)[1]
         put(world, name, world.truth(name)[1] + np.array([*by, 0.0]), orientation)

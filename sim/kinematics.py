@@ -34,8 +34,7 @@ def inverse(arm: Arm, r: Array, p: Array, swivel: Array, margin: float = 0.0, fo
     margin : float
         Distance in radians that every joint keeps from its limits.
     fold : float
-        Distance in radians that a joint keeps from the angle where its two solutions meet, which is the limit of the arm's
-        reach.
+        Distance in radians that a joint keeps from the angle where its two solutions meet; the arm's reach ends at this angle.
 
     Returns
     -------
@@ -82,7 +81,7 @@ def _by_elbow(arm: Arm, r: Array, p: Array, swivel: Array, most: float) -> tuple
 
 
 def _angles_far_from_limits(arm: Arm, r: Array, first: int) -> Array:
-    """Return angles (n, 3) of the spherical joint from joint `first` on; with parallel outer axes, the angles far from limits."""
+    """Return angles (n, 3) of the spherical joint from joint `first` on; if its outer axes are parallel, angles far from limits."""
     axes, part = arm.axes[first : first + 3], slice(first, first + 3)
     three = three_angles(r, axes)
     if abs(axes[0] @ axes[2]) < 0.5:
@@ -168,7 +167,7 @@ def _frame(a: Array, b: Array) -> Array:
 
 
 def _length(vectors: Array) -> Array:
-    """Return the lengths (n,) of vectors (n, 3) in half of the time of `numpy.linalg.norm` for a few vectors."""
+    """Return the lengths (n,) of vectors (n, 3); for a few vectors, in half of the time of `numpy.linalg.norm`."""
     return np.asarray(np.sqrt(np.add.reduce(vectors * vectors, axis=-1)))
 
 

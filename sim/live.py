@@ -31,7 +31,7 @@ from confab.sim.verdict import SkillError, Verdict
 from confab.sim.world import PhysicsWorld
 
 STOPPED = 0.02
-"""Lag in radians of a joint behind its command above which the arm counts as blocked."""
+"""The arm counts as blocked if a joint lags behind its command by more than this angle in radians."""
 
 UPRIGHT = 0.1
 """Maximum tilt in radians of an upright hand."""

@@ -78,7 +78,7 @@ class Traveller(Protocol):
 
 @dataclass(frozen=True)
 class Reacher:
-    """An arm among obstacles, with tests whether paths are possible.
+    """An arm among obstacles, with tests of whether paths are possible.
 
     The arm keeps `margin` metres from the obstacles. Every joint keeps `joint_margin` radians from its limits, and the elbow
     keeps `fold` radians from the stretched arm.
@@ -212,7 +212,7 @@ def connect(
     Parameters
     ----------
     goals : sequence of array (6,)
-        The goal poses in order of preference. A search grows from all goals at once.
+        The goal poses in order of preference. The search tree grows from all goals at once.
     attempts : int
         Maximum number of samples.
     """
@@ -365,7 +365,7 @@ def timed(arm: Arm, q: Array, limits: MotionLimits, rate: float) -> tuple[Array,
 
 
 def scheduled(q: Array, rows: Array, top: Array, most: Array, rate: float) -> tuple[Array, Array]:
-    """Return positions and velocities at `rate` hertz along samples `q`; `rows` keep the limits of speed and acceleration."""
+    """Return positions and velocities at `rate` hertz along samples `q`; the limits of speed and acceleration apply to `rows`."""
     first, second = np.gradient(rows, axis=0), np.zeros_like(rows)
     second[1:-1] = np.diff(rows, 2, axis=0)
     push = most / 2

@@ -41,7 +41,7 @@ MARGIN = 22
 """Width in pixels of the picture's empty border."""
 
 TALL, LEGS = 0.30, 0.12
-"""Distances in metres above and below a place that a picture shows."""
+"""Distances in metres above and below a place; a picture shows the range between these heights."""
 
 EDGE = 14.0
 """Minimum difference in brightness, on a scale up to 255, between neighbouring pixels on an edge."""
@@ -238,7 +238,7 @@ def _cast_shadows(world: Engine, image: Array, depth: Array, camera: Camera) -> 
 
 @lru_cache(maxsize=8)
 def _plane(camera: Camera, height: float) -> tuple[Array, Array, Array]:
-    """Return where the ray of each pixel meets the horizontal plane at `height`: the distance along the ray, x and y."""
+    """Return, for each pixel, where its ray meets the horizontal plane at `height`: the distance along the ray, x and y."""
     with np.errstate(divide="ignore"):
         distance = (height - camera.eye[2]) / camera.rays[..., 2]
     distance = np.where(np.isfinite(distance) & (distance > 0), distance, 1e6)

@@ -28,8 +28,10 @@ from confab.sim.stages import MARGIN, Numbers, grip_stages, rises
 from confab.sim.urdf import Spheres, UrdfModel
 
 VERSION = "3"
-"""Version of the computation of reach, which is part of the fingerprint of the inputs. A stored result of another
-version counts as outdated."""
+"""Version of the computation of reach; the fingerprint of the inputs contains the version.
+
+A stored result of another version counts as outdated.
+"""
 
 LAYERS = 3
 """Maximum number of movable bodies that stand on one another for which reach is computed."""

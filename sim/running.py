@@ -20,7 +20,7 @@ TOLD = ("object", "source", "target", "place")
 """The order of roles in which a failure names the objects of a skill."""
 
 LEDGE = 0.01
-"""Maximum height in metres of a fixture above a place that the fixture supports."""
+"""Maximum height in metres by which a fixture may rise above a place that it supports."""
 
 
 @dataclass

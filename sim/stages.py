@@ -24,11 +24,11 @@ MARGIN = 0.008
 class Stage:
     """One stage of a motion, with one pose for each of n candidates.
 
-    `poses` (n, 6) are the candidates' poses, and `ignored` are the obstacles that the stage may touch. `around`, if
-    given, has the obstacles at this stage. `closed` is true if the fingers are closed around something, and `released`
-    is true if the hand has released its load. `near` is true if the hand holds a handle, so that the margin is small.
-    `slack` is an additional margin in radians to the limits of the joints, and `fold` is the margin in radians to the
-    stretched arm. `joint` is the value of the moved joint of furniture. `phase` is the name of the skill's phase.
+    `poses` (n, 6) are the candidates' poses, and `ignored` are the obstacles that the stage may touch. `around`, if given, has
+    the obstacles at this stage. `closed` is true if the fingers are closed around something, and `released` is true if the hand
+    has released its load. `near` is true if the hand holds a handle; the margin is then small. `slack` is an additional margin
+    in radians to the limits of the joints, and `fold` is the margin in radians to the stretched arm. `joint` is the value of
+    the moved joint of furniture. `phase` is the name of the skill's phase.
     """
 
     poses: Array

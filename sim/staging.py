@@ -26,7 +26,7 @@ DRAWS = 20
 """Maximum number of draws of an object's random deviation until the object overlaps no other object."""
 
 SPECK = [[0.0, 0.0, 0.0], [1e-5, 0.0, 0.0], [0.0, 1e-5, 0.0]]
-"""An invisibly small triangle, the visual shape of beads, since `confab.sim.picture` draws beads faster than PyBullet."""
+"""An invisibly small triangle as the visual shape of beads, since `confab.sim.picture` draws beads faster than PyBullet."""
 
 
 @dataclass(frozen=True)

@@ -72,7 +72,7 @@ class _Job:
             raise self.error
 
     def wait(self) -> None:
-        """Wait for a simulation step of the world; called in the job's thread."""
+        """Wait for a simulation step of the world; the job's thread calls this method."""
         self.paused.release()
         self.go.acquire()
 
@@ -170,7 +170,7 @@ def _moved_bodies(world: PhysicsWorld, step: Step) -> set[str]:
 def _workplace(
     world: PhysicsWorld, step: Step
 ) -> Callable[[], np.ndarray[tuple[int, ...], np.dtype[np.float64]] | None]:
-    """Return a function that returns the horizontal position (2,) of a primitive's work: its last body, place or hand."""
+    """Return a function that returns the horizontal position (2,) of a primitive's work: of its last body, place or hand."""
     named = (*step.arguments, *step.bindings.values())
     hand = next((name for name in named if name in world.hands), None)
 

@@ -25,7 +25,7 @@ YIELDS, ASIDE_BY = 6, 0.002
 """Maximum number of times that a hand yields to contact, and distance in metres by which the hand yields each time."""
 
 ROOM = 0.01
-"""Distance in metres between an open finger and an object; at less distance, the hand slows down in proportion."""
+"""Distance in metres of an open finger from an object, below which the hand slows down in proportion."""
 
 SLOWEST = 0.1
 """Minimum share of its speed to which the hand slows down."""

@@ -1,8 +1,9 @@
 """Trajectories of a verified plan as data: joint paths with times, gripper commands and grasp frames.
 
 The data have the form of ROS messages. Each primitive and hand has a `control_msgs/FollowJointTrajectory` goal, and
-`control_msgs` gripper commands with times. Grasp frames are a position and a quaternion (x, y, z, w). Units are metres, radians,
-seconds and newtons. `replay` executes the data in a new world by joint servos, without skills, planning or touch.
+`control_msgs` gripper commands with times. Grasp frames are a position and a quaternion (x, y, z, w). Units are metres,
+radians, seconds and newtons. `replay` executes the data in a new world by joint servos, without skills, planning or sense of
+touch.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from confab.sim.urdf import Array
 from confab.sim.world import PhysicsWorld, PrimitiveStep
 
 EXACT = 3e-4
-"""Maximum deviation in radians of the exported path, which is linear between its points, from the commanded path."""
+"""Maximum deviation in radians of the exported path from the commanded path; the exported path is linear between its points."""
 
 GOAL_TOLERANCE, TIME_TOLERANCE = 0.01, 0.5
 """Tolerance in radians of each joint at the end of a path, and tolerance in seconds of the path's duration."""

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 MOST_LINKS, MOST_SPHERES = 500, 10_000
 """Maximum length of a chain of links, and maximum number of spheres that cover one shape; larger models are rejected."""
 FARTHEST = 1e6
-"""Maximum absolute value of a number, since squares of much larger numbers overflow."""
+"""Maximum absolute value of a number; the squares of much larger numbers would overflow."""
 MOVABLE = ("revolute", "continuous", "prismatic")
 
 

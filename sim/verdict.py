@@ -31,7 +31,7 @@ CODES = {
 
 
 REFUTED = ("no path", "goal in collision")
-"""Codes of failed motion planning, which refute a step in the present state of the world."""
+"""Codes of failures in motion planning; such a failure refutes a step in the present state of the world."""
 
 
 class _Verdict(TypedDict):
@@ -74,9 +74,9 @@ class RolloutJson(TypedDict):
 class Verdict:
     """The result of a step in the world.
 
-    `measured` maps names, which end with the unit, to measured numbers. After failed motion planning, `facts` has the positions
-    of the step's objects. The step is refuted while these facts hold. If a body blocks a link, `swings` names the link, and
-    `likewise` contains the refutations of the other steps that the body blocks, for any hand.
+    `measured` maps names to measured numbers; each name ends with the unit. After failed motion planning, `facts` has the
+    positions of the step's objects. The step is refuted while these facts hold. If a body blocks a link, `swings` names the
+    link, and `likewise` contains the refutations of the other steps that the body blocks, for any hand.
     """
 
     ok: bool

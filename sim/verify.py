@@ -17,7 +17,7 @@ from confab.sim.verdict import RolloutJson, StepReportJson, Verdict
 from confab.sim.world import PhysicsWorld, PrimitiveStep
 
 LOOKS = 3
-"""Maximum number of observations, with noisy perception, until a difference from the expected state counts."""
+"""With noisy perception, number of observations after which a difference from the expected state counts."""
 
 
 @known_as("an entry")

@@ -18,13 +18,13 @@ from confab.sim.urdf import Array
 from confab.sim.verdict import SkillError
 
 RAISED = ("rise", "home")
-"""With noisy perception, number of observations after which a difference from the expected state counts."""
+"""Motions after which a hand is raised."""
 
 LEVEL = 0.01
 """Maximum difference in metres between the height of a place and the base of an object that stands at the place."""
 
 MOVED = 0.03
-"""Length in metres of a motion after which a stopped hand counts as lost."""
+"""A stopped hand counts as lost if its motion was longer than this distance in metres."""
 
 
 def point_of(world: Engine, name: str) -> Array:
@@ -34,7 +34,7 @@ def point_of(world: Engine, name: str) -> Array:
 
 
 def level_place(world: Engine, point: Array, height: float) -> tuple[str, float]:
-    """Return the nearest place whose height differs from a point's by less than `height` metres, and the horizontal distance."""
+    """Return the nearest place whose height differs by less than `height` metres from a point, and the horizontal distance."""
     points = {name: world.place(name) for name in world.embodiment.places}
     gaps = {name: float(np.hypot(*(point - at)[:2])) for name, at in points.items() if abs(point[2] - at[2]) < height}
     best = min(gaps, key=gaps.__getitem__, default="")
@@ -54,7 +54,7 @@ def arrived(world: Engine, hand: str, motion: str, target: str) -> None:
 
 @contextmanager
 def stopping(world: Engine, hand: str) -> Iterator[None]:
-    """Mark a hand as lost if the block raises `SkillError` after the hand has moved."""
+    """Mark a hand as lost if the ``with`` block raises `SkillError` after the hand has moved."""
     begin = world.hands[hand].frame()[1]
     try:
         yield

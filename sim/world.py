@@ -30,7 +30,7 @@ class PrimitiveStep(Protocol):
 
     @property
     def id(self) -> int:
-        """Number of the grounded behaviour."""
+        """ID of the grounded behaviour."""
 
     @property
     def behavior(self) -> str:
@@ -124,7 +124,7 @@ class PhysicsWorld(Engine):
         return state
 
     def believed(self, state: State) -> tuple[Fact, ...]:
-        """Return the facts of a perceived state about hidden objects, which are believed and not perceived."""
+        """Return the facts of a perceived state about hidden objects; such facts are believed and not perceived."""
         hidden = {name for name in self.known if not self.perceives(name)}
         return tuple(Fact(symbol, value) for symbol, value in state.items() if symbol.arguments[0] in hidden)
 

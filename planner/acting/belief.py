@@ -54,7 +54,7 @@ class Belief:
 
     @cached_property
     def using(self) -> Compiled:
-        """The compiled domain, which is compiled at the first use, so that the time limit of an episode applies."""
+        """The compiled domain; it is compiled at its first use, so that the time counts towards an episode's time limit."""
         return compiled(self.problem)
 
     @property

@@ -38,13 +38,13 @@ class Intervention:
     ----------
     change : InterventionKind
     facts : tuple of Fact
-        The facts that hold from then on, or the new goals.
+        The facts that hold after the intervention, or the new goals.
     symbol : Symbol, optional
         The symbol whose goal is dropped.
     individual, kind : str
         The object that is added, removed, pushed or knocked over, and its class.
     numbers : tuple of float
-        Metres: the displacement of an object along x and y; or width, depth and height of a box.
+        Numbers in metres: the displacement of an object along x and y, or the width, depth and height of a box.
     after : int or tuple of int, optional
     at : float, optional
     text : str
@@ -114,7 +114,8 @@ class Failure:
 class ExecutedPrimitive:
     """An executed primitive with its begin and end, the world's verdict, and the unexpected values observed after the primitive.
 
-    `relied_on` lists the static facts (relation and individuals) on which the primitive, or the refined behaviour, relied.
+    `relied_on` lists the static facts (relation and individuals) on which the primitive, or an ancestor of the primitive,
+    relied.
     """
 
     step: Step
@@ -165,7 +166,7 @@ class Episode:
     planned : Plan
         The plan before the first step.
     done : Plan
-        The executed steps; a failed primitive isn't part of the plan, unless its effects were observed afterwards.
+        The executed steps; a failed primitive isn't among them, unless its effects were observed afterwards.
     initial, observed : State
         The situation in the beginning, and the situation that was observed in the end.
     goal : State

@@ -4,8 +4,8 @@ If a primitive fails although its preconditions hold, the static facts on which 
 (for instance, the fact that a hand can reach a place). Counts never decrease, so the counts of several robots can be
 added. A fact that failed more often than it held is avoided if there is a plan without this fact.
 
-A refutation by motion planning is certain and more specific: the behaviour is impossible while the objects stay at
-their places (`refuted_by`).
+A refutation by motion planning is certain, and more specific than a count: the behaviour is impossible while the objects stay
+at their places (`refuted_by`).
 """
 
 from __future__ import annotations
@@ -91,8 +91,8 @@ def refuted_by(
     chain : sequence of Step
         The primitive, preceded by its ancestors.
     facts : sequence of Fact
-        The places of all participating objects; empty if unknown. A behaviour of an upper level is refuted only if the
-        level sees all of these facts.
+        The places of all participating objects; empty if unknown. A behaviour of an upper level is refuted only if the level
+        sees all facts in `facts`.
     why : str
     likewise : sequence of Refutation
         Primitives that are refuted for the same reason, with any hand. An ancestor is refuted if no other behaviour has its

@@ -1,11 +1,11 @@
 """Repair of a plan: steps that are still valid are kept, and the other steps are planned again.
 
-The remaining steps of the plan are replayed on a state table from the present situation. A step is dropped if its
-purpose holds already, or is no longer a goal. A step is kept if its primitives still have their effects; otherwise the
-step is refined again (for another hand, for instance). A step is put off if the step isn't applicable yet; later steps
-about the same individuals are then put off, too. The steps that were put off are tried again after each successful
-step. The default planner then achieves the remaining goals, on the same table. If a hand is in the middle of a step,
-the step is finished first, or the hand is brought to rest.
+The remaining steps of the plan are replayed on a state table from the present situation. A step is dropped if its purpose holds
+already, or is no longer a goal. A step is kept if its primitives still have their effects; otherwise the step is refined again
+(for another hand, for instance). A step is put off if the step isn't applicable yet; later steps about the same individuals are
+then put off, too. The steps that were put off are tried again after each successful step. The default planner then achieves the
+remaining goals, on the same state table. If a hand is in the middle of a step, the step is finished first, or the hand is
+brought to rest.
 
 `confab.planner.validation` checks every repaired plan.
 """
@@ -81,7 +81,7 @@ def repair_or_replan(
     problem : Problem
         The present situation, and the present goal.
     rest : sequence of Step
-        The remaining steps; the first step may be partly done, with only its open sub-steps below it.
+        The remaining steps; if the first step is partly done, it contains only its remaining sub-steps.
     planned : Problem
         The problem for which `rest` was planned: the expected situation, and the goal.
     planner : callable, optional
@@ -117,15 +117,16 @@ def repair(
     limits: Limits,
     begun: bool = False,
 ) -> Repaired | None:
-    """Return steps for the open goals that keep as many valid steps of `rest` as possible, or None if none were found.
+    """Return steps that achieve the open goals and contain as many valid steps of `rest` as possible, or None.
 
-    The lower bound `least` counts the planned steps that the changes don't affect, the step in progress, and one step
-    per open goal; an affected individual adds one step.
+    The lower bound `least` is the cost of the step in progress, of the planned steps that mention no changed individual, of
+    one step per open goal, and of one step per changed individual.
     """
     wanted = planned.goal
     touched = changed_individuals(planned, problem)
     call = Call(problem, using, limits.end(SHARE), min(limits.expansions, MOST))
-    # Only replanning proves impossibility. A repair undoes no applied step, because a restart would be a new plan.
+    # Only replanning can prove that the task is impossible. A repair undoes no applied step, because a restart would be a new
+    # plan.
     agenda = Agenda(call, solvable=True, forward=True)
     pending = list(rest)
     try:
@@ -306,7 +307,7 @@ def _replay(call: Call, pending: list[Step], wanted: State) -> bool:
 def _redo(call: Call, step: Step, begun: bool = False) -> RefinedStep | None:
     """Apply a step with its primitives; on failure, leave the table unchanged and return None.
 
-    A step in `begun` was begun earlier, so only its primitives are checked; any other step must be applicable and have
+    If `begun`, the step was begun earlier, so only its primitives are checked; otherwise the step must be applicable and have
     its effects.
     """
     mark = len(call.table.trail)

@@ -1,8 +1,7 @@
 """The world in which the executive acts: a simulation, a set of symbols, or a robot (docs/connecting.md).
 
-A world has three functions and a clock. The executive calls `observe` and `execute` from one thread, never at the same
-time. `stop` is the exception: another thread may call `stop` while `execute` runs, and the executive calls `stop` after
-an exception in `execute`.
+A world has three functions and a clock. The executive calls `observe` and `execute` from one thread, never at the same time.
+Another thread may call `stop` while `execute` runs, and the executive calls `stop` after an exception in `execute`.
 """
 
 from __future__ import annotations
@@ -107,7 +106,7 @@ class Discoverer(Protocol):
     def discoveries(self) -> Sequence[Discovery]:
         """Return the discoveries since the last call.
 
-        From then on, observations may name the discovered individuals.
+        After this call, observations may name the discovered individuals.
         """
 
     def free_spots(self) -> Sequence[Discovery]:

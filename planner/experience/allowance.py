@@ -50,7 +50,7 @@ class Allowance:
             raise OverspentError
 
     def bounded(self, attempt: Callable[[], Found | None]) -> Found | None:
-        """Return the result of an attempt, or None if the attempt fails, or if matching rules exceeds the limit.
+        """Return the result of an attempt, or None if the attempt fails, or if the matching of rules exceeds the limit.
 
         Attempts may be nested: the effort of an inner attempt doesn't count towards the limit of the outer attempt.
         """

@@ -28,7 +28,7 @@ DECAY = 0.9
 CROWD = 4
 """Maximum size of a class for which preferences for single individuals are counted."""
 Named: TypeAlias = "Mapping[str, str]"
-"""The individual in each role, by role."""
+"""The individual of each role, by the name of the role."""
 Answer: TypeAlias = "Callable[[str, Named], str]"
 """Function that returns the answer to a question about an individual in a role."""
 
@@ -137,7 +137,7 @@ class Factor:
 
 
 class Scorer:
-    """Computation of the cogency of following a rule from counts."""
+    """Computation of the cogency of following a rule; the cogency is computed from counts."""
 
     def __init__(self, experience: Experience) -> None:
         self.totals = experience.totals()
@@ -182,7 +182,7 @@ class Scorer:
         return sum(factor.weight for factor in self.factors(rule, facts, individuals))
 
     def score(self, reader: FactReader, rule: Rule, roles: tuple[str, ...]) -> float:
-        """Return the cogency of following a rule with individuals in its roles, by the counted facts."""
+        """Return the cogency of following a rule with individuals in its roles, according to the counted facts."""
         weights = self.weights(rule)
         if rule.name not in self._asked:
             self._asked[rule.name] = frozenset(asks for asks, _ in weights)

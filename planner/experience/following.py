@@ -222,7 +222,7 @@ class RulePolicy:
         return None
 
     def undone_within_reach(self, level: int, mark: int) -> bool:
-        """Return whether rules can achieve again those achieved goals of the call that were undone since a marked state."""
+        """Return whether rules can restore the achieved goals of the call that were undone since a marked state."""
         kept, trail = self.call.kept, self.call.table.trail[mark:]
         undone = dict.fromkeys((situation, key) for situation, key, _ in trail if (situation, key) in kept)
         return level != self.first or all(self.instances.distance(level, (cell, kept[cell])) < inf for cell in undone)

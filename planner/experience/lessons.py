@@ -178,7 +178,7 @@ def record(experience: Experience, problem: Problem, using: Compiled) -> Lesson:
     lesson, open_ = Lesson(), policy.open()
     with suppress(LimitError):
         by_rules(policy)
-    check("learning")  # a record without time for the rules would count failures
+    check("learning")  # if the rules had no time, the record would count failures
     for cell in open_:
         kinds = {rule.goals for rule in policy.instances.rules.get((call.program.levels[0], cell[0]), ())}
         lesson.counted += [

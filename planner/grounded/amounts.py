@@ -228,7 +228,7 @@ class Amounts:
     quantities : sequence of Quantity
         The bounds of the amount at each place.
     bits : mapping of (difference, sign) to bit
-        The bit is set if the difference is ``>=``, ``>`` or ``=`` 0.
+        The bit is set if the difference is at least, greater than, or equal to 0, as the sign states.
     size : int
         Number of bits of a state for facts and comparisons; the number of the tuple is stored above these bits.
     moves : function of an operator

@@ -32,7 +32,7 @@ from confab.reasoner.limits import OutOfTimeError
 from confab.reasoner.symbols import Problem, State
 
 SHORTEN, STEP, STEPS, SHORTENING = 200_000, 1_000, 400, 50
-"""Constants of the work for shortening a plan, in examined operators.
+"""Constants that determine the maximum work of shortening a plan; the unit is one examined operator.
 
 The work is the sum of `SHORTEN`, `STEP` for each of the first `STEPS` steps, and the work of the search divided by `SHORTENING`.
 """
@@ -68,9 +68,10 @@ def plan_level(
     problem : Problem
     level : int, optional
     initial, goal : State, optional
-        By default the states of the problem; the default goal includes the rest values of symbols that are initially at rest.
+        By default, the initial state and the goal of the problem; the default goal includes the rest values of symbols that are
+        initially at rest.
     limits : Limits
-        Maximum number of expansions by h_FF, and seconds, including grounding.
+        Maximum number of expansions by h_FF, and maximum time in seconds, including grounding.
     most_work : float
         Maximum work, in bits processed by relaxed plans.
     most_rows : int, optional

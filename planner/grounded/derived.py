@@ -21,7 +21,7 @@ from functools import cached_property, partial
 from confab.planner.grounded.derived_arrays import Bit, by_arrays
 
 AT_ONCE, CALLS = 50, 60
-"""Number of alternatives that arrays process while Python processes one alternative, and cost of a layer in alternatives.
+"""Number of alternatives that arrays process while Python processes one, and cost of a layer as a number of alternatives.
 
 The cost of a layer is the cost of the calls to the array library.
 """

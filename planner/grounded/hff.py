@@ -1,10 +1,10 @@
 """The relaxed-plan heuristic h_FF, which also yields the applicable and the preferred operators.
 
-A layer contains the bits that are reached at the same time. A relaxed operator is reached when its last required bit is reached.
-The cost of a bit is the sum of two parts: the repetitions of the cheapest operator that sets the bit, and the costs of the bits
-that this operator requires. An operator that changes an amount is repeated until a comparison holds. The number of repetitions is
-the difference divided by the operator's change, or one if the change depends on the state. The relaxed plan consists of the
-supporters of the goal. A goal that is unreachable in the relaxed task is unreachable in the task.
+A layer contains the bits that are reached at the same time. A relaxed operator is reached when its last required bit is
+reached. The cost of a bit is the sum of two parts: the cost of all repetitions of the cheapest operator that sets the bit, and
+the costs of the bits that this operator requires. An operator that changes an amount is repeated until a comparison holds. The
+number of repetitions is the difference divided by the operator's change, or one if the change depends on the state. The relaxed
+plan consists of the supporters of the goal. A goal that is unreachable in the relaxed task is unreachable in the task.
 
 The heuristic is described by Hoffmann and Nebel, "The FF planning system", JAIR 14 (2001). Additive costs choose the supporters,
 as in Keyder and Geffner, "Heuristics for planning with action costs revisited", ECAI 2008. Repetitions are described by Scala,

@@ -19,8 +19,8 @@ LOOK = 1_000
 def landmarks(task: Task, deadline: float | None = None) -> int:
     """Return the mask of facts that every plan makes true at some time, including the goals.
 
-    After the deadline, return only the goals. The deadline is a time on the clock of `time.perf_counter`. Thousands of facts with
-    thousands of achievers each take seconds.
+    After the deadline, return only the goals. The deadline is a time on the clock of `time.perf_counter`. The computation takes
+    seconds for thousands of facts with thousands of achievers each.
     """
     behind = [
         0 if task.initial >> bit & 1 else -1 for bit in range(task.size)

@@ -21,7 +21,7 @@ from confab.reasoner.derivation import circular
 from confab.reasoner.symbols import Rule
 
 SAID_ONCE = 20_000
-"""Minimum number of saved conditions, over all operators, at which shared conditions are evaluated once per state.
+"""Shared conditions are evaluated once per state if this saves at least this number of conditions, summed over all operators.
 
 The evaluation of this number of conditions for a relaxed plan takes a millisecond.
 """
@@ -117,7 +117,8 @@ def _meaning(
 ) -> None:
     """Enter the meaning of a bit into `means`.
 
-    The meaning of a bit with a single alternative is the bits of this alternative. Every other bit means itself.
+    The meaning of a bit with a single alternative is the bits of this alternative. The meaning of every other bit is the bit
+    itself.
     """
     waiting = [bit]
     while waiting:

@@ -56,7 +56,7 @@ def _parts(effect: ValueEffect) -> list[ValueEffect | ValueCondition]:
 def _shape(effect: ValueEffect) -> object:
     """Return the shape of an effect; effects that differ only in individuals have the same shape.
 
-    The shape contains conditions other than value conditions unchanged.
+    In the shape, conditions other than value conditions are unchanged.
     """
     values = tuple(
         (type(p), p.situation, tuple(t if is_variable(t) else "" for t in p.arguments), p.value) for p in _parts(effect)

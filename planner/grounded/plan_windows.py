@@ -2,13 +2,13 @@
 
 A replacement starts in the same state as the window, and sets the bits that later steps and the goal require. The amounts after
 the replacement must still let the later steps reach the goal. The search for a replacement uses the operators nearest to the
-window. An operator is near if few steps lead from the start of the window to the operator, and few steps from the operator to the
-end of the window. The search is A* with h_FF (`confab.planner.grounded.shortest`). States from which h allows no cheaper plan are
-dropped.
+window. An operator is near if few steps lead from the start of the window to the operator, and few steps from the operator to
+the end of the window. The search is A* with h_FF (`confab.planner.grounded.shortest`). A state is dropped if, according to h,
+no cheaper plan leads through the state.
 
-Windows are tried on the given plan and on a regrouped plan, in which each step follows a step that it depends on. Finally, the
-remaining work is spent on the whole plan as one window, with all operators and a greater weight of h. Of two equally cheap plans,
-the plan with fewer steps counts as cheaper (`TRIFLE`).
+Windows are tried on the given plan and on a regrouped plan, in which each step follows a step on which it depends. Finally, the
+remaining work is spent on the whole plan as one window, with all operators and a greater weight of h. Of two equally cheap
+plans, the plan with fewer steps counts as cheaper (`TRIFLE`).
 
 Work is counted in examined operators instead of seconds. Therefore the result is the same on every machine.
 
@@ -39,7 +39,7 @@ STATES, STEPS = 400, 12
 """Before windows are tried, a cheapest plan is searched with at most `STATES` states, if the given plan has at most `STEPS` steps.
 """
 WAYS = 20
-"""Number of alternatives of derived bits that are processed in the time of one operator."""
+"""Number of alternatives of derived bits that are processed in the time in which one operator is examined."""
 SIZES = (8, 16, 32, 64)
 """Lengths of windows in steps; a long window can contain a whole round trip that a shorter plan avoids."""
 OPERATORS, EVALUATIONS, SHARE = 150, 100, 2_000
@@ -214,7 +214,7 @@ class _Windows:
 
     @cached_property
     def cut(self) -> float:
-        """The weight of h_FF when states are dropped.
+        """The weight of h_FF in the test that drops states.
 
         The weight is below 1 if costs differ, because h_FF may then exceed the remaining cost.
         """
@@ -267,7 +267,7 @@ class _Windows:
         return found[::-1]
 
     def replacement(self, steps: list[int], state: int, wanted: int, spent: float) -> list[int] | None:
-        """Search for a replacement of a window: steps from a state to the required bits that cost less than `spent`.
+        """Search for a replacement of a window: steps that lead from a state to the required bits and cost less than `spent`.
 
         Return None if the search with operators near the window finds no replacement.
         """
@@ -364,8 +364,8 @@ class _Windows:
     def part(self, operators: list[int], state: int, wanted: int) -> tuple[Task, list[int]]:
         """Return the task of reaching the required bits from a state by the given operators, and the operators of this task.
 
-        The task has no bits for symbols that the given operators don't change. Operators that require another value of a symbol
-        without bits are excluded.
+        The task has no bits for symbols that the given operators don't change. If an operator requires that such a symbol has
+        another value, the operator is excluded.
         """
         task = self.task
         if task.amounts is not None:

@@ -20,7 +20,9 @@ Members = Callable[[str], frozenset[str]]
 
 
 def in_parts(schema: Schema, members: Members) -> tuple[list[Schema], dict[str, SituationType]]:
-    """Return a schema without the variables that only conditions use, the rules for these conditions, and their situation types.
+    """Return a schema without the variables that only conditions use.
+
+    Also return auxiliary rules for these conditions, and the situation types that the rules define.
 
     A variable is removed only if the removal saves rows.
 

@@ -173,7 +173,7 @@ class _Sums:
 
     @cached_property
     def limits(self) -> Mapping[int, tuple[int, Fraction]]:
-        """The position of the amount and the bound, by the bit of a comparison that is a lower bound on one amount."""
+        """For the bit of each comparison that is a lower bound on one amount, the position of the amount and the bound."""
         return {
             bit: (difference.terms[0][0], Fraction(-difference.constant) / Fraction(difference.terms[0][1]))
             for (difference, _), bit in self.amounts.bits.items()
@@ -188,7 +188,7 @@ class _Sums:
     def kept(self, place: int) -> Fraction | None:
         """Return the part of an amount that no operator can consume, or None if unknown.
 
-        The part exists if every consuming operator requires more than the operator consumes.
+        There is such a part if every consuming operator requires a greater amount than it consumes.
         """
         least = Fraction(self.vector[place])
         for o, move in self.of[place]:

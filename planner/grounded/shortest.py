@@ -80,7 +80,7 @@ class Cheapest:
                     yield Candidate(state, (operator,), after, cost + spent)
 
     def put(self, candidate: Candidate) -> None:
-        """Rank a state by f; drop the state if its estimated total cost reaches `upper`; lower `upper` at a goal state."""
+        """Rank a state by f; drop the state if its estimated total cost reaches `upper`; at a goal state, decrease `upper`."""
         cost = candidate.cost
         h = self.bound(candidate.state)
         if cost + self.cut * h >= self.upper:

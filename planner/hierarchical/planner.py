@@ -43,7 +43,7 @@ The maximum work corresponds to a few seconds.
 FLAT_ROWS = 30_000
 """Maximum number of rows of a join when a task of one level is grounded as a whole."""
 TRIALS = 1_000_000
-"""If a level can't be grounded, maximum number of trials; a trial is a test whether one behaviour is applicable in one state."""
+"""Maximum number of trials if a level can't be grounded; a trial is the test of one behaviour in one state."""
 NOT_LEFT = "levels must not be left"
 SEARCHING = 0.93
 """Share of the time limit that is used for search; the other time is for releasing memory."""

@@ -19,7 +19,8 @@ class SearchBudget:
     steps : int
         Maximum number of relevant steps; 0 for the search of a scope.
     questions : int, optional
-        Maximum number of values on the chains towards one target, which determine the scope; None for the whole level.
+        Maximum number of values that are examined on the chains towards one target to determine the scope; None for the whole
+        level.
     spares : int
         Number of additional individuals of each symmetry class in the scope.
     work : int

@@ -9,7 +9,7 @@ from confab.planner.transitions import Key
 from confab.reasoner.symbols import Problem
 
 ENDS = 8
-"""Number of individuals at each end of a large class whose states are examined."""
+"""Number of individuals at each end of a large class; only the states of these individuals are examined."""
 
 
 class SymmetryClasses:

@@ -25,7 +25,7 @@ LOOKING = 1_800_000
 FIRST_TESTS, AT_ONCE, PAIRS = 8_000, 20_000, 500_000
 """Maximum number of conditions that the search for a certificate tests.
 
-The numbers apply before a search, in the paper's mode, and after failed searches.
+The three numbers are the limits before a search, in the paper's mode, and after failed searches.
 """
 TEST = 8
 """Work of testing one condition, in the unit of `Workspace.effort`."""

@@ -117,7 +117,7 @@ class Workspace:
     # ---------------------------------------------------------------------------------------------------- required values
 
     def refining(self, level: int, careful: bool = False) -> Keep:
-        """Return the function of required final values in the refinement of a step of a level.
+        """Return the function `keep` of required final values for the refinement of a step of a level.
 
         Symbols that the level sees must be unchanged. All other symbols must be at rest. A symbol without a rest value
         may have any final value; if `careful`, the symbol must be unchanged. A remembered symbol may become true.
@@ -132,7 +132,7 @@ class Workspace:
         return keep
 
     def keeping(self, kept: Mapping[Cell, str]) -> Keep:
-        """Return the function of required final values for steps towards a goal.
+        """Return the function `keep` of required final values for steps towards a goal.
 
         Achieved goals must hold, and all other symbols must be at rest.
         """

@@ -56,7 +56,7 @@ def cogencies(
     Returns
     -------
     mapping of conclusion to float
-        In [-inf, 0]; larger is more cogent. Dimensionless.
+        The values are in [-inf, 0]; a larger value is more cogent. Dimensionless.
     """
     facts = situation(state, problem, level)
     uniform = -sum(math.log(len(values)) for _, _, values in facts)

@@ -75,7 +75,7 @@ class Activity:
 
 
 class Noting(Facts):
-    """Facts that record read accesses."""
+    """A view of facts that records each read access."""
 
     def __init__(self, problem: Problem, rules: BehaviorReader) -> None:
         super().__init__(problem, problem.initial, rules)
@@ -156,7 +156,7 @@ class _Course:
         return self.pieces[name]
 
     def begin(self, number: int) -> None:
-        """Begin a step: test its conditions, make the effects at its begin, and record the effects at its end."""
+        """Begin a step: test its conditions, make the effects of its begin, and store the effects of its end."""
         step, pieces = self.steps[number], self.piece(number)
         terms = self.terms[number] = terms_at(self.rules, pieces, step.arguments, self.facts)
         seconds = duration_of(self.problem, pieces.whole, terms, self.facts)
@@ -169,7 +169,7 @@ class _Course:
         self.made[number]["middle"] = self.done(step, pieces.middle, terms, False)
 
     def end(self, number: int) -> None:
-        """End a step: make the recorded effects, test the conditions at its end, and make the effects at its end."""
+        """End a step: make the stored effects, test the conditions of its end, and make the effects of its end."""
         for cell, (_, after) in self.made[number]["middle"].changes.items():
             self.facts.put(*cell, after)
         self.made[number]["end"] = self.done(self.steps[number], self.piece(number).end, self.terms[number], True)

@@ -153,7 +153,7 @@ class _Cut:
         )
 
     def asked(self, name: str) -> list[tuple[str, tuple[str, ...]]]:
-        """Return the symbols that a behaviour divided into begin and end requires throughout its duration."""
+        """Return the symbols that a split behaviour requires throughout its duration."""
         asked = timing_of(self.whole.domain.behaviors[name]).asked(Span.THROUGHOUT)
         return [(c.situation, c.arguments) for c in asked if isinstance(c, ValueCondition)]
 

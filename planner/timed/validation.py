@@ -33,7 +33,7 @@ def validate_timed(
     separation : Fraction
         The minimum time between conflicting events, in seconds (epsilon in PDDL).
     executed : bool
-        Whether the times come from an execution, so that durations may differ from the stated ones.
+        Whether the times come from an execution, so that durations may differ from the stated durations.
     """
     faults: list[Fault] = []
     if only_during(problem):

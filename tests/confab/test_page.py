@@ -231,7 +231,7 @@ def test_nothing_to_do_makes_a_page(serving_plan: confab.Result) -> None:
     assert page_data(serving_plan.scene, nothing)["status"] == "nothing to do: all goals hold"
 
 
-# ------------------------------------------------------------------------------------------------------------ updates
+# ------------------------------------------------------------------------------------------------------ changed facts
 
 
 def test_a_fact_that_is_turned_changes_the_plan(scene: confab.Scene) -> None:
