@@ -21,6 +21,7 @@ from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
 from confab.reasoner.memory.experience_file import Lines
 from confab.reasoner.names import local_name, nearest
 from confab.reasoner.vocabulary import ARGUMENTS, CORE
+from confab.show import bindings_of
 from confab.table import Table
 
 if TYPE_CHECKING:
@@ -213,7 +214,8 @@ def _lines(scene: Scene, mode: Mode) -> tuple[str, ...]:
     if not result.solved:
         return (f"no plan: {result.json().get('reason')}",)
     return tuple(
-        "  " * (len(step.path) - 1) + " ".join((step.behavior, *step.arguments)) for step in result.plan.walk()
+        "  " * (len(step.path) - 1) + " ".join((step.behavior, *step.arguments)) + bindings_of(step)
+        for step in result.plan.walk()
     )
 
 

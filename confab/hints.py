@@ -154,6 +154,7 @@ SCENE = {
     "to_unified_planning()": "unified_planning to_up as_up up to_unified",
     "read_episode(FILE)": "load_episode open_episode parse_episode load_execution read_execution",
     "read_report(FILE, PLAN)": "load_report load_verdicts read_verdicts load_verification",
+    "read_result(FILE)": "load_result open_result read_plan_result result_from_file explain_plan_file",
     "read_plan(FILE)": "load_plan open_plan parse_plan from_plan plan_from_file plan_from_json",
     "with_episodes(FILE)": "add_episode add_episodes load_history history episodes log",
     "affordances": "afforded afford possible_actions applicable applicable_actions legal_actions available_actions "
@@ -254,7 +255,7 @@ RESULT = {
     "result.plan == other.plan": COMPARE,
     "copy.deepcopy(result)": COPY,
     "scene.plan()": "replan plan_again repair again redo resolve next",
-    "scene.read_plan(FILE)": "load from_file read from_json parse load_plan read_plan from_dict loads",
+    "scene.read_result(FILE)": "load from_file read from_json parse load_plan read_plan from_dict loads load_result read_result",
     "scene.to_pddl()": "to_pddl pddl as_pddl",
     "confab export SCENE --bt (in a shell)": "behavior_tree to_bt bt behaviortree export_bt to_behavior_tree btcpp "
     "py_trees xml to_xml",

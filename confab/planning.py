@@ -279,7 +279,7 @@ def _plan(
     queries = scene.knowledge.round_trips - asked
     part = seen if in_part else None
     seconds = {**scene.seconds, "quantify": quantified}
-    return Result(scene, problem, outcome, seconds, queries, part, tuple(goals), timed)
+    return Result(scene, problem, outcome, seconds, queries, part, tuple(goals), timed, mode == "optimal")
 
 
 def _none_at_all(problem: Problem, deadline: Deadline) -> bool:
@@ -303,6 +303,32 @@ def _by_an_engine(problem: Problem, deadline: Deadline) -> Outcome | str | None:
     return theirs.reason.text if theirs.reason else "it found no plan"
 
 
+def result_of(scene: Known, plan: Plan, goals: Facts = ()) -> Result:
+    """Return the result of a planning call that found a given plan.
+
+    Parameters
+    ----------
+    scene : Scene
+    plan : Plan
+        The plan. It may leave soft goals unmet.
+    goals : str or iterable of str
+        The goals of the plan, each of which replaces the scene's goal for the same symbol.
+
+    Raises
+    ------
+    KnowledgeError
+        The plan isn't valid in the scene; the message has the first fault.
+    """
+    texts = tuple(several(goals))
+    problem = with_goals(scene.problem, texts)
+    if not needs_others_meanwhile(problem):
+        if faults := validate(problem.only(problem.weights), plan):
+            raise KnowledgeError(f"the plan isn't valid in this scene with these goals: {faults[0].text}")
+        soft = problem.weights.keys()
+        problem = problem.only({one for one in soft if validate(problem.only(soft - {one}), plan)})
+    return Result(scene, problem, Outcome(Status.SOLVED, plan), dict(scene.seconds), goals=texts)
+
+
 def _seen(reading: Reading, observed: str | Path | None) -> Reading:
     from confab.reasoner.reading.observed import load_observed
 
@@ -320,7 +346,7 @@ class Result(metaclass=RightNames):
 
     `problem` has the individuals that the task can need. `queries` is the number of queries to the store. `part` is the part of
     the scene from which the problem was read; it is None for the whole scene. `goals` are the given goals, which replaced goals
-    of the task.
+    of the task. `optimal` states whether the search looked for an optimal plan.
     """
 
     scene: Known = field(compare=False)
@@ -331,6 +357,7 @@ class Result(metaclass=RightNames):
     part: Reading | None = field(default=None, compare=False)
     goals: tuple[str, ...] = ()
     timed: TimedPlan | None = None
+    optimal: bool = False
 
     def faults(self, plan: Plan) -> list[Fault]:
         """Return the faults of a plan for the same task in the whole scene; the list is empty if the plan is valid."""
@@ -495,7 +522,12 @@ class Result(metaclass=RightNames):
                 return self.in_whole_scene().why_not(asked, instead)
             labels = self.labels
             place = None if instead is None else find_step(self.plan, instead, labels)
-            told = why_not(asked, self.problem, self.plan, labels, ask, replan, place)
+            try:
+                told = why_not(asked, self.problem, self.plan, labels, ask, replan, place)
+            except KnowledgeError:  # possibly only the whole scene has an individual of the text
+                if self.part is None:
+                    raise
+                return self.in_whole_scene().why_not(asked, instead)
             # Plans for other goals come from `replan`, which has checked them.
             own = asked.split()[:1] and asked.split()[0] in self.problem.domain.behaviors
             if not own or self.part is None or told.plan is None or not self.faults(told.plan):
@@ -554,7 +586,7 @@ class Result(metaclass=RightNames):
     def dearer(self) -> str:
         """Return a remark on possible cheaper plans, and the option that searches for a cheaper plan.
 
-        The text is empty if nothing indicates a cheaper plan, or if the search has proved a bound.
+        The text is empty if nothing indicates a cheaper plan, or if the plan is proved optimal.
 
         Examples
         --------
@@ -564,13 +596,17 @@ class Result(metaclass=RightNames):
         """
         from confab.planner.plan_costs import in_circles
 
-        if self.outcome.plan is None or self.outcome.bound is not None:
+        if self.outcome.plan is None or self.outcome.proved:
             return ""
+        if self.optimal:
+            return "a longer time limit (--time-limit, in Python time_limit) may prove more, or find a better plan"
         how = "--optimal (in Python optimal=True) looks for a cheaper one"
         if circles := in_circles(self.problem, self.plan):
             of = len(self.plan.primitives)
             return f"{circles} of the {of} primitives only undo each other (the steps above ask for them); {how}"
         costs = {behavior.cost for behavior in self.problem.domain.behaviors.values()}
+        if self.outcome.bound is not None:
+            return how
         if self.outcome.cost is not None or len(costs) > 1:
             return f"the plan costs {self.cost:g}, and no bound is known: {how}"
         return ""

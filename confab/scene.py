@@ -185,6 +185,27 @@ class Scene(Known):
         """
         return plan_of(path, self.problem)
 
+    def read_result(self, plan: AnyPlan, goals: Facts = ()) -> Result:
+        """Return a plan, for example the name of a file of `Result.save`, as a result that explains, verifies and executes it.
+
+        Each of the `goals` replaces the scene's goal for the same symbol, as in `plan`.
+
+        Raises
+        ------
+        KnowledgeError
+            There is no plan in the file, or the plan isn't valid in this scene.
+
+        Examples
+        --------
+        >>> scene = load("beverage-serving")
+        >>> plan = scene.plan().plan
+        >>> scene.read_result(plan).why(0)
+        L1#0  move cup 1 to location 7
+          gives   cup 1 is at location 7 (before: location 2)
+          because the goal requires that cup 1 is at location 7
+        """
+        return planning.result_of(self, plan_of(plan, self.problem), goals)
+
     def read_episode(self, path: str | Path) -> Execution:
         """Return the execution in a JSON file of `Execution.save` or ``confab execute --json``.
 

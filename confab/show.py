@@ -89,11 +89,16 @@ def _label(step: Step, notes: Notes) -> list[tuple[str, str]]:
     """Return the line for one step as pieces of text, each with a style of rich."""
     style = STYLES[min(len(step.path), len(STYLES)) - 1]
     label = [(f"{step.id:>2} ", "dim"), (step.behavior, style), (" " + " ".join(step.arguments), "")]
-    if step.bindings and not step.steps:
-        label.append(("  " + ", ".join(f"{name}: {value}" for name, value in step.bindings.items()), "dim italic"))
+    if not step.steps:
+        label.append((bindings_of(step), "dim italic"))
     if step.path in notes:
         label.append(("  " + notes[step.path], "bold red" if "✗" in notes[step.path] else "green"))
     return label
+
+
+def bindings_of(step: Step) -> str:
+    """Return the values of a step's variables as text, with two spaces before it; the text is empty without variables."""
+    return "  " * bool(step.bindings) + ", ".join(f"{name}: {value}" for name, value in step.bindings.items())
 
 
 def _label_of_joined(step: Step) -> list[tuple[str, str]]:
@@ -106,17 +111,17 @@ def lengths(plan: Plan) -> str:
     return " / ".join(map(str, plan.length.values())) or "no"
 
 
-def _proved(plan: Plan, cost: float | None, bound: float | None) -> str:
+def _proved(outcome: Outcome) -> str:
     """Return a text with the cost of a plan (if behaviours have costs) and the proved bound on its length or cost."""
+    cost, bound = outcome.cost, outcome.bound
     said = "" if cost is None else f", costs {cost:g}"
     if bound is None:
         return said
     best = "shortest" if cost is None else "cheapest"
-    if (len(plan.primitives) if cost is None else cost) <= bound:
+    if outcome.proved:
         return f"{said}, proved {best} on the lowest level"
     least = f"has at least {bound:g} primitives" if cost is None else f"costs at least {bound:g}"
-    least = f": any plan for these goals {least}" if bound > 0 else ""
-    return f"{said}; not proved {best}{least}; --optimal and a longer time limit may prove more, or find a better plan"
+    return f"{said}; not proved {best}" + (f": any plan for these goals {least}" if bound > 0 else "")
 
 
 def summary(outcome: Outcome) -> str:
@@ -130,21 +135,21 @@ def summary(outcome: Outcome) -> str:
         goals = "all goals that must be met" if unmet else "all goals"
         done = f"solved: nothing to do, since {goals} hold ({outcome.seconds * 1000:.0f} ms)"
         return "\n".join([done, *unmet])
-    bound = _proved(outcome.plan, outcome.cost, outcome.bound)
+    bound = _proved(outcome)
     counts = outcome.plan.length
     on = (
         " per level"
         if not counts or min(counts) == 1
         else f" on level{'s' * (len(counts) > 1)} {' / '.join(map(str, counts))}"
     )
-    effort = f"{expanded} expansion{'s' * (expanded != 1)} in all"
+    effort = f", {expanded} expansion{'s' * (expanded != 1)} in all" if outcome.search else ""
     if outcome.hits or outcome.misses:
         effort += f", refinements {outcome.hits} from the cache and {outcome.misses} searched"
+    if outcome.seconds:  # a plan from a file wasn't searched
+        effort += f", {outcome.seconds * 1000:.0f} ms of search"
     breaks = [broken.text for left in outcome.left for broken in left.broken]
     by = f" by {outcome.engine}" if outcome.engine else ""
-    lines = [
-        f"solved{by}: {lengths(outcome.plan)} steps{on}, {effort}, {outcome.seconds * 1000:.0f} ms of search{bound}"
-    ]
+    lines = [f"solved{by}: {lengths(outcome.plan)} steps{on}{effort}{bound}"]
     lines += unmet
     lines += outcome.given_up
     lines += [f"the plan violates a condition of the level above: {text}" for text in breaks]

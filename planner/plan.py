@@ -326,7 +326,11 @@ class Forgone:
     price: Fraction | None
 
     def __str__(self) -> str:
-        more = "no plan that meets it was found" if self.price is None else f"it would cost {written(self.price)} more"
+        more = (
+            "no plan that meets it was found"
+            if self.price is None
+            else f"it would cost at most {written(self.price)} more"
+        )
         return f"{self.fact} (weight {written(self.weight)}; {more})"
 
 
@@ -362,6 +366,13 @@ class Outcome:
     saving: float | None = None
     certificate: Certificate | None = None
     forgone: tuple[Forgone, ...] = ()
+
+    @property
+    def proved(self) -> bool:
+        """Whether `bound` proves that no plan is cheaper than `plan`."""
+        if self.plan is None or self.bound is None:
+            return False
+        return (len(self.plan.primitives) if self.cost is None else self.cost) <= self.bound
 
     @property
     def unmet(self) -> frozenset[Symbol]:

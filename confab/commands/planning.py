@@ -31,7 +31,7 @@ from confab.commands.options import (
     scene_names,
 )
 from confab.examples import examples
-from confab.planner.solve import Mode
+from confab.planner.solve import DEFAULT_MODE, Mode
 from confab.progress import progress
 from confab.reasoner.files import check_folder
 from confab.reasoner.graph.knowledge import KnowledgeError
@@ -380,8 +380,11 @@ def execute(
     metavar="WHAT",
     help="The alternative: 'cup2 LOCATION location8 by left_hand', 'B2_PICK right_hand cup1'.",
 )
+@click.option("--plan", type=PATH, metavar="PLAN.json", help="Plan to explain, instead of a new one.")
 @GOALS
 @MEMORY_FILE
+@MODE
+@click.option("--optimal", is_flag=True, help="As --mode optimal: explain a plan of the search for an optimal plan.")
 @click.option(
     "--step",
     type=click.IntRange(min=0),
@@ -402,8 +405,11 @@ def explain(
     scene: str,
     which: str | None,
     instead: str | None,
+    plan: Path | None,
     goal: tuple[str, ...],
     memory: Path | None,
+    mode: Mode,
+    optimal: bool,
     step: int,
     level: int,
     check: Path | None,
@@ -417,16 +423,26 @@ def explain(
     from confab.planning import Result
 
     if check is not None:
-        if any(given is not None for given in (which, instead, memory, against, plot)):
+        if any(given is not None for given in (which, instead, plan, memory, against, plot)):
             raise KnowledgeError(
-                "--check verifies a certificate and plans nothing; leave out STEP, --not and options of memory"
+                "--check verifies a certificate and plans nothing; leave out STEP, --not, --plan and options of memory"
             )
         with limited(time_limit):
             checked = checked_certificate(load_scene(scene), goal, check)
         show_result(checked.json() if as_json else str(checked))
         raise Exit(YES if checked.holds else NO)
+    if plan is not None and (optimal or mode != DEFAULT_MODE):
+        raise KnowledgeError("--plan names the plan to explain, so that none is made; leave out --mode and --optimal")
     with limited(time_limit):
-        told = _explained(scene, which, instead, goal, memory, step, level, against, plot)
+        loaded = load_scene(scene)
+        remembered = memory_for(memory, False, loaded)
+        with progress("planning"):
+            if plan is not None:
+                result = loaded.read_result(plan_in(plan, loaded), goal)
+            else:
+                planner = None if optimal or mode == "optimal" else remembered  # the optimal search uses no memory
+                result = loaded.plan(goal, planner, mode, optimal=optimal)
+        told = _explained(result, which, instead, remembered, step, level, against, plot)
     if isinstance(told, Result):
         because = told.explain()
         show_result({**told.json(), "proof": list(because.proof)} if as_json else because)
@@ -435,21 +451,16 @@ def explain(
 
 
 def _explained(
-    scene: str,
+    result: Result,
     which: str | None,
     instead: str | None,
-    goal: tuple[str, ...],
-    memory: Path | None,
+    remembered: Memory | None,
     step: int,
     level: int,
     against: str | None,
     plot: Path | None,
 ) -> Any:
-    """Plan in a scene, and return the requested explanation; if there is no plan, return the result of planning."""
-    loaded = load_scene(scene)
-    remembered = memory_for(memory, False, loaded)
-    with progress("planning"):
-        result = loaded.plan(goal or (), remembered)
+    """Return the requested explanation of a result; if there is no plan, return the result."""
     if not result.solved:
         return result
     if level not in result.problem.domain.levels:
@@ -476,6 +487,7 @@ def _by_memory(result: Result, memory: Memory, which: str, against: str | None, 
     asked = find_step(result.plan, which, result.labels)
     on = result.plan.at_level(asked.level)
     steps = [(s.behavior, s.arguments) for s in on]
+    result = result.in_whole_scene() if against else result  # the task may not need an individual of the alternative
     other = ground_named(result.problem, against) if against else None
     found = explain_step(result.problem, memory, steps, on.index(asked), other, result.labels)
     if plot is not None:

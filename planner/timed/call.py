@@ -37,10 +37,14 @@ SECONDS = 10.0
 
 @dataclass(frozen=True)
 class Timed:
-    """The result of scheduling: a timed plan that the checker accepts, or the reason why no timed plan was found."""
+    """The result of scheduling: a timed plan that the checker accepts, or the reason why no timed plan was found.
+
+    `late` is the time in seconds by which the best schedule misses windows and deadlines.
+    """
 
     plan: TimedPlan | None = None
     reason: Reason | None = None
+    late: Fraction = Fraction(0)
 
 
 def best_in_time(problem: Problem, plan: Plan, seconds: float | None = None, shorten: bool = True) -> Timed:
@@ -88,6 +92,8 @@ def _best(problem: Problem, plan: Plan, seconds: float | None, shorten: bool) ->
     found = Timed()
     with suppress(LimitError):
         found = in_time(problem, other, left(1))
+    if first.plan is None and 0 < found.late < first.late:
+        return found
     if found.plan is None or (first.plan is not None and first.plan.makespan <= found.plan.makespan):
         return first
     return found
@@ -137,7 +143,7 @@ def in_time(
             scheduler = "CP-SAT"
         proved = bound if proved is None else min(bound, proved)  # the first choices allow the most schedules
         if found.begins.late:
-            return Timed(reason=_late(problem, order, network, choices, found))
+            return Timed(reason=_late(problem, order, network, choices, found), late=found.begins.late * network.unit)
         timed = timed_plan(problem, plan, order, network, choices, found)
         if timed is not None:
             timed = replace(timed, bound=proved * network.unit, scheduler=scheduler, bounds=THESE_STEPS)
@@ -175,7 +181,7 @@ def _late(problem: Problem, order: Order, network: Network, choices: Choices, fo
     if one.at is not None and begin > one.at:
         missed.append(f"it happens at {float(one.at):g} s")
     return Reason(
-        f"no schedule was found that keeps all windows and deadlines; in the best one, {one.step} "
+        f"no schedule was found that keeps all windows and deadlines; in the best one found, {one.step} "
         f"takes from {float(begin):g} to {float(end):g} s, but {', and '.join(missed)}",
         (str(one.step),),
     )

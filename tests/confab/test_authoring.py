@@ -69,11 +69,18 @@ def test_the_difference_of_two_scenes_names_what_came_and_went(tmp_path: Path) -
     assert changed.gained["individual"] == ("tray",)
     assert changed.gained["quantified"] == ("B1_CARRY plate1 tray", "B1_CARRY plate2 tray")
     assert changed.lost["quantified"] == ()
-    assert changed.before == ("B1_CARRY plate1 sink", "B1_WASH plate1", "B1_CARRY plate1 table")
-    assert changed.after == ("B1_WASH plate1", "B1_CARRY plate1 table")
+    assert changed.before == ("B1_CARRY plate1 sink", "B1_WASH plate1  where: sink", "B1_CARRY plate1 table")
+    assert changed.after == ("B1_WASH plate1  where: sink", "B1_CARRY plate1 table")
     assert "+ quantified B1_CARRY plate1 tray" in str(changed)
     same = difference(confab.load(scene), confab.load(scene), "paper")
     assert str(same) == "the plan is the same: 2 steps"
+
+
+def test_plans_that_differ_only_in_the_values_of_variables_are_different() -> None:
+    scene = confab.load("beverage-serving")
+    said = str(difference(scene, scene.with_fact("cup1 LOCATION location6"), "guarded"))
+    assert "-B1_MOVE cup1 location7  from: location2" in said
+    assert "+B1_MOVE cup1 location7  from: location6" in said
 
 
 @pytest.fixture

@@ -122,7 +122,7 @@ def test_right_names_are_what_the_hints_say(things: dict[str, object]) -> None:
         ("from confab import load, solve", r"use confab.load\(SCENE\).plan\(\)"),
         ("confab.Scene.load('x')", r"use confab.load\(SOURCE\)"),
         ("confab.Scene.from_file('x')", r"use confab.load\(SOURCE\)"),
-        ("confab.Result.from_json('x')", r"use scene.read_plan\(FILE\)"),
+        ("confab.Result.from_json('x')", r"use scene.read_result\(FILE\)"),
         ("Plan.from_json('x')", r"use scene.read_plan\(FILE\)"),
         ("confab.Memory.open('x')", r"confab.Memory.load\(FILE\)"),
     ],

@@ -83,6 +83,35 @@ def test_what_cannot_be_done_names_the_condition(serving: confab.Result, asked: 
     assert serving.why_not(asked).lacks == (lacks,)
 
 
+def test_an_alternative_may_name_an_individual_that_the_task_does_not_need() -> None:
+    result = confab.load("living-room").plan()
+    assert "bread1" not in result.problem.individuals
+    assert "“eat bread 1” isn't applicable" in str(result.why_not("EAT bread1"))
+
+
+def test_a_saved_plan_is_explained_like_a_new_one(serving: confab.Result, tmp_path: Path) -> None:
+    file = serving.save(tmp_path / "plan.json")
+    again = confab.load("beverage-serving").read_result(file)
+    assert again.why("L2#0") == serving.why("L2#0")
+    assert str(again.why_not("B2_PICK left_hand bottle1")) == str(serving.why_not("B2_PICK left_hand bottle1"))
+    assert again.explain().steps == serving.explain().steps
+    run = CliRunner().invoke
+    told = run(app, ["explain", "beverage-serving", "L2#0", "--plan", str(file)])
+    assert told.output.strip() == str(serving.why("L2#0"))
+    other = run(app, ["explain", "beverage-serving", "--plan", str(file), "--goal", "cup2 LOCATION location8"])
+    assert "isn't valid in this scene with these goals: the goal <cup2, LOCATION> = location8" in str(other.exception)
+    both = run(app, ["explain", "beverage-serving", "--plan", str(file), "--optimal"])
+    assert "leave out --mode and --optimal" in str(both.exception)
+
+
+def test_a_saved_plan_keeps_the_soft_goals_that_it_meets(tmp_path: Path) -> None:
+    scene = confab.load("wishes-small")
+    result = scene.plan()
+    again = scene.read_result(result.save(tmp_path / "plan.json"))
+    assert again.problem.goal == result.in_whole_scene().problem.goal
+    assert again.explain().steps == result.explain().steps
+
+
 @pytest.mark.parametrize("asked", ["B1_MOVE cup2 location1", "B2_PICK right_hand cup1", "B1_MOVE bottle1 location6"])
 def test_what_can_be_done_is_planned_to_the_goal_and_costed(serving: confab.Result, asked: str) -> None:
     told = serving.why_not(asked)

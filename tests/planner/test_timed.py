@@ -9,7 +9,7 @@ import pytest
 
 import confab
 from confab.planner.hierarchical.planner import plan
-from confab.planner.plan import Limits, Outcome, Status
+from confab.planner.plan import Limits, Outcome, Reason, Status
 from confab.planner.solve import Request, solve
 from confab.planner.timed import concurrent
 from confab.planner.timed.bounds import of_any_plan
@@ -130,6 +130,15 @@ def test_a_window_and_a_deadline_are_kept_or_said_to_be_missed() -> None:
     assert told.plan is None
     assert told.reason is not None
     assert "is a goal by 1 s" in told.reason.text
+    assert told.late > 0
+
+
+def test_of_two_late_schedules_the_reason_names_the_times_of_the_less_late(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = plan(serving()).plan
+    assert found is not None
+    told = [Timed(reason=Reason(f"late by {late} s"), late=Fraction(late)) for late in (11, 1)]
+    monkeypatch.setattr("confab.planner.timed.call.in_time", lambda *_: told.pop(0))
+    assert best_in_time(serving(), found).reason == Reason("late by 1 s")
 
 
 def planned(problem: Problem) -> tuple[Outcome, Timed | None]:
