@@ -143,7 +143,7 @@ def kept() -> list[dict[str, Any]]:
 
 
 def carry(names: Sequence[str]) -> None:
-    """Count rollouts of older code for the present code if the first rollouts of the same task and noise are reproduced."""
+    """Accept rollouts of older code as those of the present code if the first rollouts of the task and noise are reproduced."""
     rows, now = read(), code()
     for name, noise in product(names, NOISE):
         older = [one for one in rows if (one["task"], one["noise"]) == (name, noise) and one["code"] != now]

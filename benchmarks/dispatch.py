@@ -144,7 +144,7 @@ def _random(first: int, limited: bool) -> Iterator[tuple[Problem, TimedPlan]]:
 
 
 def _run(problem: Problem, timed: TimedPlan, rng: Random, figures: Figures) -> None:
-    """Execute a plan with random durations, and add what happened to the figures."""
+    """Execute a plan with random durations, and add the results to the figures."""
     counts = figures.counts
     factors = [Fraction(rng.randint(700, 1300), 1000) for _ in timed.slots]
     dispatch = Dispatch(problem, timed, SPREAD)

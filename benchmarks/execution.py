@@ -95,7 +95,7 @@ def random_intervention(problem: Problem, state: State, random: Random, kind: st
 
 
 def _contents(problem: Problem, content: SituationType) -> tuple[str, list[str]]:
-    """Return the value that means empty, which belongs to no subclass of the range, and the other values."""
+    """Return the value that means empty, and the other values; the former belongs to no subclass of the range."""
     below = {v for k, m in problem.classes.items() if content.range in problem.parents.get(k, ()) for v in m}
     values = problem.classes[content.range]
     return next(v for v in values if v not in below), [v for v in values if v in below]
@@ -180,7 +180,7 @@ def physical() -> None:
 
 
 def physical_intervention(trial: Trial, seed: int) -> Intervention:
-    """Return the intervention of an episode in PyBullet, which for half of the seeds may happen inside a primitive."""
+    """Return the intervention of an episode in PyBullet; for half of the seeds, it may happen inside a primitive."""
     random, kind = Random(1000 + seed), KINDS[seed % len(KINDS)]
     position = random.randrange(len(trial.plan.primitives))
     intervention = random_intervention(trial.problem, trial.states[position], random, kind)

@@ -148,7 +148,10 @@ class Servo:
                 )
 
     def cubic(self, now: float) -> tuple[Array, Array]:
-        """Return positions and velocities at a time, from the cubic between two points. Outside of all points, the hand rests."""
+        """Return positions and velocities at a time, from the cubic between two points.
+
+        Before the first point and after the last point, the hand rests.
+        """
         after = int(np.searchsorted(self.times, now, side="right"))
         if after in (0, len(self.times)):
             edge = self.positions[min(after, len(self.times) - 1)]

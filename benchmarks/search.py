@@ -240,7 +240,7 @@ def lengths() -> None:
 def at_least(problem: Problem) -> int:
     """Return a lower bound on the number of primitives of a table's plan that leaves the hands empty and raised.
 
-    An object that changes its place, and a bottle that is poured from, is grasped and put down at least once, which takes six
+    An object that changes its place, and a bottle that is poured from, is grasped and put down at least once; this takes six
     primitives. If no hand reaches both places of the object, it is grasped and put down twice. A pour takes four primitives. If
     cup and bottle are each moved at most once, a hand that moves the bottle must reach a place of the cup; otherwise one more
     move is counted.

@@ -245,7 +245,7 @@ def _refined(
 
 
 def _from(problem: Problem, level: int, state: State) -> Problem:
-    """Return the problem from a state between two steps of a level, with the behaviours up to that level."""
+    """Return the problem whose initial state is a state between two steps of a level, with the behaviours up to that level."""
     behaviors = {b.name: b for b in problem.domain.behaviors.values() if b.level >= level}
     goal = problem.goal_on(level)
     return replace(problem, domain=replace(problem.domain, behaviors=behaviors), initial=state, goal=goal)

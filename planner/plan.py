@@ -1,4 +1,4 @@
-"""The values of a planning call: a plan as a tree of steps, and the outcome."""
+"""Data types of a planning call: a plan as a tree of steps, and the outcome."""
 
 from __future__ import annotations
 
@@ -138,9 +138,9 @@ class Plan(Sequence[Step], metaclass=RightNames):
         Raises
         ------
         IndexError
-            The first level has no step with the number.
+            The first level has no step with this number.
         confab.planner.finding.UnknownStepError
-            No step, or more than one step, has the path or the words.
+            No step, or more than one step, has this path or these words.
         """
         if isinstance(index, str | tuple):
             from confab.planner.finding import Place, find

@@ -304,8 +304,8 @@ class Reading:
     def total(self, aggregate: Aggregate, arguments: tuple[str, ...]) -> Range:
         """Return the range of a sum or a count by its definition.
 
-        If a solution certainly holds, its number is added to both ends of the range. If a solution only may hold, its number
-        can only widen the range.
+        If a solution certainly holds, its number is added to both ends of the range. If a solution may hold but need not hold,
+        its number can only widen the range.
         """
         key = aggregate.situation, arguments
         if key not in self._totals:

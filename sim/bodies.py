@@ -36,7 +36,7 @@ PLANKS = 12
 """Number of flat boxes in each ring of a vessel's wall."""
 
 STEP = 0.001
-"""Height in metres up to which a segment of a turned solid's outline gets no collision cylinder."""
+"""A segment of the outline of a solid of revolution gets no collision cylinder if its height in metres is at most this number."""
 
 SIDES = 40
 """Number of corners of the polygon that stands for a circle in a visual mesh."""

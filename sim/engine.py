@@ -529,7 +529,7 @@ class Engine:
     def clear_height(self, hand: Manipulator, body: str, point: Array, least: float, most: float) -> float:
         """Return the lowest height above a point, from `least` to `most`, at which an upright load keeps the margin to obstacles.
 
-        A load in a hole has to rise above the rim. The result is `least` if the load gets nearer to an obstacle on the way up,
+        A load in a hole has to rise above the rim. The result is `least` if, on the way up, the load gets nearer to an obstacle
         such as the top of a cupboard.
         """
         spheres = whole_spheres(self.bodies[body].shape)

@@ -146,7 +146,7 @@ def _phase(axis: Array, a: Array, b: Array) -> float:
 
 
 def _angles_of(axis: Array, a: Array, b: Array, product: Array, most: float) -> tuple[Array, Flags]:
-    """Return both angles (n, 2) about an axis at which `b` (3,) has a given dot product with `a` (n, 3), and flags.
+    """Return the two angles (n, 2) of rotations about an axis that give `b` (3,) a stated dot product with `a` (n, 3), and flags.
 
     The flag of two angles is true if the absolute cosine that determines the angles is below `most`.
     """

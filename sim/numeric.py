@@ -29,7 +29,10 @@ EXACT, CLOSE = 1e-10, 1e-7
 """Error in metres and radians at which a search ends early, and maximum error of a valid result."""
 
 DAMPING = 1e-6
-"""Damping of the normal equations in addition to the error. More damping is slower. Less damping makes the search unstable."""
+"""Damping of the normal equations in proportion to the error, in addition to half of the squared error.
+
+More damping is slower. Less damping makes the search unstable.
+"""
 
 SINGULAR = 0.45
 """Least singular value of the Jacobian of an arm of two equal limbs, divided by the sine of the angle between the limbs."""

@@ -136,7 +136,7 @@ def observe_held(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -
 
 
 def observe_position(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
-    """Return the position to which a hand has moved, which is `raised`, an object, or a place.
+    """Return the position to which a hand has moved: `raised`, an object, or a place.
 
     Return None if the hand was stopped on its way, or if the object at its position has moved away without the hand.
     """
@@ -195,7 +195,7 @@ def arrange_joint(draft: Draft, use: PerceiverUse, arguments: tuple[str, ...], v
 
 
 def observe_covered(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) -> str | None:
-    """Return whether a known object is hidden, except by a robot."""
+    """Return whether something other than a robot hides a known object."""
     name = arguments[0]
     if not world.knows(name):
         return None

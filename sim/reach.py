@@ -34,7 +34,7 @@ A stored result of another version counts as outdated.
 """
 
 LAYERS = 3
-"""Maximum number of movable bodies that stand on one another for which reach is computed."""
+"""Reach is computed for places on at most this number of movable bodies that stand on one another."""
 
 STAGES = ("when grasping", "when approaching", "when lifting")
 """Names of the stages of a grasp, in the order of `grip_stages`."""

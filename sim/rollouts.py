@@ -92,8 +92,8 @@ def rollouts(trial: Trial, seeds: Sequence[int], workers: int | str = 1, done: D
     Parameters
     ----------
     trial : Trial
-        The trial is pickled if there is more than one worker. Its `prepare` must then be a function of a module, or a
-        `functools.partial` of such a function.
+        The trial is pickled if there is more than one worker. If the trial is pickled, its `prepare` must be a function of a
+        module, or a `functools.partial` of such a function.
     seeds : sequence of int
     workers : int or str
         Number of processes, where 1 means this process. The value ``ray`` selects the Ray cluster of this machine, which is

@@ -24,7 +24,10 @@ ROOM = 0.25
 """Minimum distance in metres between the places at which two hands work at the same time."""
 
 FLOWING = {"tilt", "stand_upright"}
-"""Skills that count spilled beads. Two such skills never run at once, since both would count the beads of the other skill."""
+"""Skills that count spilled beads.
+
+Two skills that count spilled beads never run at once, since each of them would also count the beads of the other.
+"""
 
 LOOKING = 6
 """Number of simulation steps between checks for contact between the arms."""

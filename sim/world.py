@@ -161,7 +161,7 @@ class PhysicsWorld(Engine):
     def _with_facts(self, verdict: Verdict, step: PrimitiveStep) -> Verdict:
         """Return a verdict of failed motion planning with the facts under which the verdict holds: positions of the objects.
 
-        A body that carries one of the places is such an object, too, because the place may be out of reach where the body
+        A body that carries one of the places counts as an object, too, because the place may be out of reach where the body
         stands.
         """
         places = [self.embodiment.places[name] for name in verdict.objects if name in self.embodiment.places]

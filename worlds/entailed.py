@@ -86,7 +86,7 @@ DEFINED = {
 }  # fmt: skip
 """Situation types that hold of the members of a class (`holdsOf`), with the definition of the class."""
 CONCLUDED = {"GUARDED": ":Guarded", "TOUCHED": ":Touched", "SOUGHT": ":Sought"}
-"""Situation types that hold of the members of a class, where SWRL rules conclude the members."""
+"""Situation types that hold of the members of a class; SWRL rules conclude the members of the class."""
 PROPERTIES = ("isInside", "contains", "onFloor", "sees", "linked", "leadsTo", "endsOn")
 LOGIC = f"""
 :Place a owl:Class . :Thing a owl:Class . :Floor a owl:Class . :Hand a owl:Class . :Cleanliness a owl:Class .

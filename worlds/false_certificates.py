@@ -72,7 +72,7 @@ def disproved(meant: Interpreter, certificate: Certificate, symbol: Symbol, valu
         return False
 
     def possible(state: State) -> bool:
-        """Return whether all amounts are within their bounds, which the checker of certificates takes for granted."""
+        """Return whether all amounts are within their bounds; the checker of certificates assumes this."""
         bounds = ((slot, meant.kinds[one.situation].quantity) for one, slot in meant.slots.items())
         return all(
             (quantity.least is None or state[slot] >= quantity.least)

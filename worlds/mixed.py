@@ -48,9 +48,9 @@ MOST = 300
 UNBOUNDED = 0.03
 """Share of worlds that may be too large for an exhaustive search."""
 FEW = 8
-"""Number of states below which a world is mostly drawn again."""
+"""A world with fewer states than this number is usually drawn again."""
 EXCLUDED = 0.33
-"""Share of worlds for which a goal that no reachable state satisfies is preferred."""
+"""Share of worlds whose goal is, if possible, satisfied by no reachable state."""
 TRIES = 8
 NEAR = 0.25
 """Share of the goals reachable in one step that are kept."""

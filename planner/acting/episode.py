@@ -1,4 +1,4 @@
-"""The values of execution: interventions, events, and the episode as a whole."""
+"""Data types of execution: interventions, events, and the episode as a whole."""
 
 from __future__ import annotations
 

@@ -364,8 +364,8 @@ class _Windows:
     def part(self, operators: list[int], state: int, wanted: int) -> tuple[Task, list[int]]:
         """Return the task of reaching the required bits from a state by the given operators, and the operators of this task.
 
-        The task has no bits for symbols that the given operators don't change. If an operator requires that such a symbol has
-        another value, the operator is excluded.
+        The task has no bits for symbols that the given operators don't change. If an operator requires that a symbol without
+        bits has another value than in these states, the operator is excluded.
         """
         task = self.task
         if task.amounts is not None:

@@ -1,4 +1,4 @@
-"""Removal of variables that no effect names from schemas.
+"""Removal of unnecessary variables from schemas: variables that no effect names.
 
 For example, a move that requires some free crane becomes one operator instead of one operator for each crane. The conditions on the
 removed variable become an auxiliary rule over the other terms of these conditions. Each join then has the rows of one part instead

@@ -188,7 +188,7 @@ class _Sums:
     def kept(self, place: int) -> Fraction | None:
         """Return the part of an amount that no operator can consume, or None if unknown.
 
-        There is such a part if every consuming operator requires a greater amount than it consumes.
+        A part of the amount can't be consumed if every consuming operator requires a greater amount than it consumes.
         """
         least = Fraction(self.vector[place])
         for o, move in self.of[place]:

@@ -111,9 +111,9 @@ def _proved(problem: Problem, best: Outcome, limits: Limits, deadline: float | N
 def lm_cut(task: Task, deadline: float | None = None) -> Bound:
     """Return the LM-cut heuristic of a task as a function of a state.
 
-    After the deadline, the heuristic is the cost of the cuts found so far, which is also a lower bound. The computation adds two
-    bits to the bits of the task. The bit `always` is the precondition of operators without preconditions. The bit `end` is reached
-    from the bits of the goal at no cost.
+    After the deadline, the heuristic is the cost of the cuts found so far; this cost is also a lower bound. The computation
+    adds two bits to the bits of the task. The bit `always` is the precondition of operators without preconditions. The bit
+    `end` is reached from the bits of the goal at no cost.
     """
     always, end = task.size, task.size + 1
     needs = [bits or [always] for bits in task.needs.lists()]

@@ -206,7 +206,7 @@ class Subgoals:
         return found or sorted(lacking, key=lambda pair: len(pair[1]))[:FEW]
 
     def concern(self, individuals: frozenset[str]) -> None:
-        """Set the individuals of the current search, which are preferred in the witnesses of rules."""
+        """Set the individuals of the current search; witnesses of rules prefer these individuals."""
         if self.program.rules and individuals != self._concern:
             self._concern = individuals
             self._fresh.clear()

@@ -110,8 +110,8 @@ def proved(problem: Problem, level: int, deadline: float | None = None) -> Task 
 def looked_at(task: Task, space: Workspace, before: int) -> int:
     """Raise `UnsolvableError` if no reachable state satisfies the goal; return the number of examined states.
 
-    The work is limited to the work of the searches so far. If this work doesn't suffice for twice `before` states, no states are
-    examined, and the function returns `before`.
+    The work is limited to the work of the searches so far. If the work of the searches doesn't suffice for twice `before`
+    states, no states are examined, and the function returns `before`.
     """
     state = max(len(task.owners), LEAST)
     most = max(LOOKING, space.worked) // state

@@ -64,9 +64,9 @@ def to_rdflib(term: Any) -> Any:
 class Counting:
     """A remote store that counts the queries, the rows and bytes of its answers, and the triples that it reads for them.
 
-    It evaluates the patterns of a query in the written order, as plain engines do. So the count of triples depends on the query
-    alone, and not on an engine's optimiser. The query for the schema is the same for every task; Oxigraph evaluates it, and
-    only its rows are counted.
+    The store evaluates the patterns of a query in the written order, as plain engines do. So the count of triples depends on
+    the query alone, and not on an engine's optimiser. The query for the schema is the same for every task; Oxigraph evaluates
+    it, and only its rows are counted.
     """
 
     graph: KnowledgeGraph

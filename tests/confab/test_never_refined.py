@@ -65,7 +65,7 @@ def test_what_is_brought_back_is_planned(tmp_path: Path, options: dict[str, obje
 
 
 def test_a_goal_may_want_what_is_not_at_rest(tmp_path: Path) -> None:
-    """Only planning can tell whether such a goal is reachable; the goal itself need not have a rest value."""
+    """Only planning can tell whether a goal that isn't at rest is reachable; a goal need not have its rest value."""
     assert scene(tmp_path, DYED, WETTED).plan(["x WET true"]).outcome.status is Status.SOLVED
 
 

@@ -69,7 +69,7 @@ WALK = """(define (domain walk) (:requirements :strips :typing) (:types place co
 
 
 def walk(folder: Path, places: int, seats: int) -> Problem:
-    """Return a corridor of places that can't be walked back, with coins along it and seats at its end."""
+    """Return a corridor that can be walked in one direction only, with coins along it and seats at its end."""
     (folder / "domain.pddl").write_text(WALK)
     to = " ".join(f"(to p{i} p{i + 1})" for i in range(places - 1))
     lies = " ".join(f"(lies c{i} p{1 + i * 5 % (places - 2)})" for i in range(seats))
@@ -291,7 +291,7 @@ def test_what_failed_is_less_cogent_and_what_it_was_about_is_counted() -> None:
 
 
 def jugs(cups: int, stuck: int) -> Problem:
-    """Return cups to be filled from jugs; all jugs but the last can't be opened, which level 1 doesn't see."""
+    """Return a problem of cups to be filled from jugs; only the last jug can be opened, but level 1 doesn't see this."""
     names = tuple(f"jug{i}" for i in range(stuck + 1))
     empty, filled = has("CUP", "?c", "empty"), [becomes("CUP", "?c", "full"), becomes("FROM", "?c", "?j")]
     return world(
@@ -585,7 +585,7 @@ LORRY = """(define (domain lorry) (:requirements :strips :typing) (:types thing 
 
 
 def lorries(folder: Path, lorries: int, crates: int, places: int, each: int = 0) -> Problem:
-    """Return crates that lorries with room for two carry along roads of `each` places."""
+    """Return a problem of lorries with room for two crates, and of crates to be carried along roads of `each` places."""
     (folder / "domain.pddl").write_text(LORRY)
     each = each or places
     road = " ".join(f"(road p{i} p{i + 1}) (road p{i + 1} p{i})" for i in range(places - 1) if (i + 1) % each)

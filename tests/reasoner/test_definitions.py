@@ -234,7 +234,7 @@ def test_a_class_that_a_rule_concludes_may_be_named_in_another_definition(tmp_pa
 def test_a_class_that_never_changes_is_closed_where_owl_rl_finds_nobody(
     tmp_path: Path, expression: str, members: set[str]
 ) -> None:
-    """A class that names such a class is closed, too, and contains the individuals that are stated to be its members."""
+    """A class that names a static class is closed, too, and contains the individuals that are stated to be its members."""
     old = (
         defined(both(":Place", "[ a owl:Class ; owl:oneOf ( :hook ) ]"), "Old")
         + " :hook a owl:NamedIndividual, :Sink . <https://example.org/washing-scene#shelf> a :Old ."

@@ -27,7 +27,7 @@ State = dict[str, str]
 
 
 def holds(condition: Condition, state: State) -> bool:
-    """Return the truth value of a condition in a state, given as the value of ON for each individual."""
+    """Return whether a condition holds in a state; the state contains the value of ON for each individual."""
     match condition:
         case ValueCondition(_, (about,), value, negated):
             return (state[about] == value) is not negated
