@@ -124,6 +124,22 @@ def compared(those: Sequence[Run], one: str, other: str) -> Table:
     ------
     KnowledgeError
         A run with one of these names doesn't exist.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> import confab
+    >>> from confab.page.data import page_data
+    >>> scene = confab.load("two-cups")
+    >>> with TemporaryDirectory() as folder:
+    ...     for goal in ("cup2 LOCATION location2", "cup2 LOCATION location8"):
+    ...         page = page_data(scene, scene.plan(goal))
+    ...         written = record(new_folder(Path(folder)), page, {"goal": goal}, "none")
+    ...     those = runs(folder)
+    >>> [run.name for run in those]
+    ['001', '002']
+    >>> [row for row in compared(those, "001", "002") if row[0] in ("goal", "primitives")]
+    [('primitives', '20', '26'), ('goal', 'cup2 LOCATION location2', 'cup2 LOCATION location8')]
     """
     by_name = _by_name(those, (one, other))
     return Table(("what", one, other), tuple(_differences(by_name[one], by_name[other])))

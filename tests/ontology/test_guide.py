@@ -32,6 +32,7 @@ def test_the_authoring_guide_works_as_it_stands(
     for _, added, name, content in BLOCK.findall(AUTHORING.read_text("utf-8") + BODIES.read_text("utf-8")):
         if name:
             file = tmp_path / name
+            file.parent.mkdir(exist_ok=True)
             file.write_text((file.read_text() if added else "") + content)
             continue
         for line in content.splitlines():
@@ -71,6 +72,15 @@ def test_the_behavior_that_the_guide_writes_as_individuals_is_its_update(tmp_pat
         scene.write_text(files["toys/toys-scene.ttl"], encoding="utf-8")
         plans.append(with_current_reach(confab.load(scene), print).plan(mode="paper").json()["steps"])
     assert individuals not in domain and plans[0] == plans[1] != []
+
+
+def test_the_guide_has_a_domain_of_two_levels_in_one_file(tmp_path: Path) -> None:
+    files = {name: content for _, _, name, content in BLOCK.findall(AUTHORING.read_text("utf-8"))}
+    (tmp_path / "post.ttl").write_text(files["post/post.ttl"])
+    assert {one.severity for one in validate([tmp_path / "post.ttl"])} == {"warning", "remark"}
+    scene = confab.load(tmp_path / "post.ttl")
+    assert scene.plan().plan.length == {1: 2, 2: 6}
+    assert scene.plan(leave_levels=False).plan.length == {1: 2, 2: 7}
 
 
 def test_the_guide_s_renaming_leaves_a_domain_without_faults(tmp_path: Path) -> None:
