@@ -8,7 +8,10 @@ from __future__ import annotations
 
 import os
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
+from types import MappingProxyType
 
 ROOT = Path(__file__).resolve().parent
 CATALOG = "catalog-v001.xml"
@@ -23,12 +26,13 @@ def scenes() -> dict[str, Path]:
     return {path.stem: path for path in found if path.suffixes[-2:-1] not in [[f".{kind}"] for kind in SATELLITES]}
 
 
-def shipped() -> dict[str, Path]:
+@cache
+def shipped() -> Mapping[str, Path]:
     """Return the shipped ontologies, as the catalog lists them: IRI to file."""
-    return catalog(ROOT / CATALOG)
+    return MappingProxyType(_entries(ROOT / CATALOG))
 
 
-def catalog(path: Path) -> dict[str, Path]:
+def catalog(path: Path) -> Mapping[str, Path]:
     """Return what a catalog says: ontology IRI to file.
 
     Raises
@@ -36,6 +40,10 @@ def catalog(path: Path) -> dict[str, Path]:
     ValueError
         The file is no XML catalog; the message says where and why. Entity declarations are refused.
     """
+    return shipped() if path == ROOT / CATALOG else _entries(path)
+
+
+def _entries(path: Path) -> dict[str, Path]:
     text = path.read_text(encoding="utf-8")
     if "<!ENTITY" in text or "<!DOCTYPE" in text:
         raise ValueError(f"{path}: a catalog with a document type or entities is refused; remove the <!DOCTYPE …> part")

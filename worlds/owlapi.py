@@ -42,10 +42,10 @@ def jvm() -> str | None:
 
 def places(files: list[Path]) -> dict[str, Path]:
     """Return the files of imports by IRI: shipped ontologies, entries of catalogs, and files in the same folders."""
-    found = {f"{ontology_iri(file)}": file for file in files} | ontology.shipped()
+    found = {f"{ontology_iri(file)}": file for file in files} | dict(ontology.shipped())
     for folder in {file.parent for file in files}:
         catalog = folder / ontology.CATALOG
-        found |= ontology.catalog(catalog) if catalog.is_file() else {}
+        found |= dict(ontology.catalog(catalog)) if catalog.is_file() else {}
         found |= {ontology_iri(file): file for file in folder.glob("*.ttl")}
     return found
 

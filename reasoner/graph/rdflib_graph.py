@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 import pyoxigraph as ox
@@ -82,3 +83,19 @@ def _term(term: Any) -> Any:
             return ox.Literal(str(term), datatype=ox.NamedNode(str(datatype)) if datatype else None)
         case _:
             raise TypeError(f"{term!r} is no term")
+
+
+@lru_cache(maxsize=10_000)
+def rdflib_term(term: object) -> rdflib.term.Node:
+    """Return a term of a knowledge graph as a term of rdflib."""
+    match term:
+        case ox.NamedNode(value=value):
+            return rdflib.URIRef(value)
+        case ox.BlankNode(value=value):
+            return rdflib.BNode(value)
+        case ox.Literal(value=value, language=None, datatype=datatype):
+            return rdflib.Literal(value, datatype=rdflib.URIRef(datatype.value))
+        case ox.Literal(value=value, language=language):
+            return rdflib.Literal(value, lang=language)
+        case _:
+            raise TypeError(f"{term!r} is no term of RDF 1.1")

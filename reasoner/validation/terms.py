@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import combinations
 from pathlib import Path
 from urllib.parse import unquote
@@ -156,6 +156,7 @@ def _pairs(case: Case, predicate: str) -> Iterator[tuple[str, str]]:
 
 def files_and_iris(case: Case) -> Iterator[Fault]:
     """Find files whose name isn't the last part of their ontology's IRI, and catalog entries that lead to another file."""
+    read: dict[Path, Mapping[str, Path]] = {}
     for iri, file in case.graph.files.items():
         wanted = unquote(local_name(iri))
         if file.stem != wanted:
@@ -166,7 +167,9 @@ def files_and_iris(case: Case) -> Iterator[Fault]:
                 f"call the file {wanted}{file.suffix}, or the ontology …/{file.stem}",
             )
         for catalog in {file.with_name(ontology.CATALOG), ontology.ROOT / ontology.CATALOG}:
-            if catalog.is_file() and (entry := ontology.catalog(catalog).get(iri)) and not _same(entry, file):
+            if catalog not in read:
+                read[catalog] = ontology.catalog(catalog) if catalog.is_file() else {}
+            if (entry := read[catalog].get(iri)) and not _same(entry, file):
                 yield (
                     iri,
                     f"{catalog} says that <{iri}> lies in {entry}, not here",

@@ -319,13 +319,15 @@ def _ill_formed(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
     from rdflib import BNode, Graph, Namespace
     from rdflib.namespace import RDFS
 
+    from confab.reasoner.graph.rdflib_graph import rdflib_term
+
     sh = Namespace(SHACL)
     shapes = _shapes()
     data = Graph()
     with silent_about_numbers():  # invalid numbers, which the shapes report
         for quad in graph.store.quads_for_pattern(None, None, None, ox.NamedNode(BASE + "asserted")):
             if quad.predicate.value.startswith(SPOKEN_OF) and quad.predicate.value not in LISTS:
-                data.add(tuple(map(_rdflib, quad.triple)))  # type: ignore[arg-type]
+                data.add(tuple(map(rdflib_term, quad.triple)))  # type: ignore[arg-type]
         conforms, report, _ = shacl(data, shacl_graph=shapes, advanced=False, inference="none", do_owl_imports=False)
     if conforms or not isinstance(report, Graph):
         return
@@ -338,22 +340,6 @@ def _ill_formed(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
         rule, why, remedy = (str(shapes.value(source, said) or "") for said in (sh.name, sh.description, RDFS.comment))
         severity = WARNING if report.value(result, sh.resultSeverity) == sh.Warning else ERROR
         yield places.finding(rule, str(focus), f"{local_name(str(focus))} {message}", why, remedy, severity)
-
-
-def _rdflib(term: object) -> rdflib.term.Node:
-    from rdflib import BNode, Literal, URIRef
-
-    match term:
-        case ox.NamedNode(value=value):
-            return URIRef(value)
-        case ox.BlankNode(value=value):
-            return BNode(value)
-        case ox.Literal(value=value, language=None, datatype=datatype):
-            return Literal(value, datatype=URIRef(datatype.value))
-        case ox.Literal(value=value, language=language):
-            return Literal(value, lang=language)
-        case _:
-            raise TypeError(f"{term!r} is no term of RDF 1.1")
 
 
 @cache
