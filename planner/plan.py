@@ -388,12 +388,12 @@ Shortening = Literal["brief", "once", "repeated"]
 class Limits:
     """Limits of a planning call.
 
-    `seconds` limits the whole call, unless `seconds` is None. In the paper's mode, `expansions` limits each search. In
-    the other modes, `expansions` limits the sum of all searches for single goals, and separately the final search for
-    all goals together. `work` limits searches in grounded levels and parts of levels until a plan is found. The unit of
-    `work` is states times operators, about a microsecond each. `shortening` is the work for a shorter plan: one round
-    ("once"); one round with little work, and none if `seconds` is given ("brief"); or rounds until a round saves
-    nothing or until `seconds` have passed ("repeated").
+    `seconds` limits the whole call, unless `seconds` is None. In the paper's mode, `expansions` limits each search. In the
+    other modes, `expansions` limits the sum of all searches for single goals, and separately the final search for all goals
+    together. `work` limits searches in grounded levels and parts of levels until a plan is found. The unit of `work` is states
+    times operators, about a microsecond each. `shortening` is the work for a shorter plan. With "once", there is one round.
+    With "brief", there is one round with little work, or no round if `seconds` is given. With "repeated", rounds follow one
+    another until a round saves nothing or until `seconds` have passed.
     """
 
     expansions: int = 200_000

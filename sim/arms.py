@@ -2,7 +2,8 @@
 
 The functions of kinematics compute many postures at once.
 
-``q`` postures (n, k) in radians, of k joints · ``R`` rotations (n, 3, 3) · ``p`` points (n, 3) in metres · ``a`` axes
+Arrays have these names: ``q`` are postures (n, k) of k joints in radians, ``R`` are rotations (n, 3, 3), ``p`` are points (n,
+3) in metres, and ``a`` are axes.
 """
 
 from __future__ import annotations

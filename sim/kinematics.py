@@ -8,8 +8,8 @@ the last joint from the middle of its limits, minus the roll of the hand. For a 
 form. `confab.sim.numeric` solves arms without a closed form. Without a closed form, the swivel is the angle of the third joint
 from the middle of its limits if the arm has seven joints, and always 0 if the arm has six joints.
 
-``q`` postures (n, k) in radians, of k joints · ``R`` rotations (n, 3, 3) · ``p`` points (n, 3) in metres · ``a`` axes · S, E, W
-shoulder, elbow, wrist
+Arrays have these names: ``q`` are postures (n, k) of k joints in radians, ``R`` are rotations (n, 3, 3), ``p`` are points (n,
+3) in metres, and ``a`` are axes. S, E and W are shoulder, elbow and wrist.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ hand's horizontal pointing direction, roll is the rotation about this direction,
 `confab.sim.kinematics` maps a pose to a posture. A path with roll 0 keeps a cup upright. The path is a straight line if the
 line is free of collisions, otherwise the result of a short RRT-Connect in the same six coordinates.
 
-``poses`` (n, 6) · ``q`` postures (n, k) of an arm with k joints
+Arrays have these names: ``poses`` (n, 6), and ``q`` for postures (n, k) of an arm with k joints.
 """
 
 from __future__ import annotations

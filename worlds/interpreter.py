@@ -3,9 +3,9 @@
 The interpreter shares no code with the searches, the proofs and the plan checker, so that it can serve as their reference.
 Conditions are grounded by trying every binding, and written as Python expressions over a tuple of values.
 
-slot     the position of a symbol's value in a state; static symbols have no slot
-state    a tuple: a text for each symbol, a number for each amount; defined situations come last
-node     a state, with the changed symbols that don't have their rest value
+A *slot* is the position of a symbol's value in a state; static symbols have no slot. A *state* is a tuple with a text for each
+symbol and a number for each amount; defined situations come last. A *node* is a state with the changed symbols that don't have
+their rest value.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Random problems with numbers, and their transitions in plain Python for an exhaustive search.
 
-`jugs`     water is filled in, poured away, and poured over as far as it fits, until jugs hold the goal amounts
-`rounds`   a van delivers parcels; it has a capacity, and a drive costs its length times the load
+In `jugs`, water is filled in, poured away, and poured over as far as it fits, until jugs hold the goal amounts. In `rounds`, a
+van with a capacity delivers parcels, and a drive costs its length times the load.
 """
 
 from __future__ import annotations

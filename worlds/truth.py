@@ -4,8 +4,8 @@ The plan checker's interpreter (`confab.planner.validation.BehaviorReader`) comp
 combination of values of the symbols that the interpreter reads, the interpreter is called once. The results form a decision
 tree for each grounded behaviour, by which arrays of states are processed.
 
-code    a state as one integer, with a field of bits for each symbol
-tree    maps the values of a symbol to trees; a leaf has the assigned values, or is None (not applicable)
+A *code* is a state as one integer, with a field of bits for each symbol. A *tree* maps the values of a symbol to trees; a leaf
+contains the assigned values, or is None if the behaviour isn't applicable.
 """
 
 from __future__ import annotations

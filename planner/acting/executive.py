@@ -1,10 +1,10 @@
 """The executive: it plans, executes primitives, observes, handles interventions, and repairs the plan.
 
-belief:    the situation as last observed, the current goal, and doubts that failures have raised.
-agenda:    the steps still to be done; the first step may be partly done.
-expected:  the situation that the next observation should show.
-aside:     goals that are impossible in the present situation; pursued again after an unexpected observation.
-put off:   goals that are unreachable while facts are in doubt; tried again when all other goals are done.
+`belief` is the situation as last observed, with the current goal and the doubts that failures have raised. `agenda` contains
+the steps still to be done; the first step may be partly done. `expected` is the situation that the next observation should
+show. `aside` contains goals that are impossible in the present situation; they are pursued again after an unexpected
+observation. `put_off` contains goals that are unreachable while facts are in doubt; they are tried again when all other goals
+are done.
 
 Rule 1: a primitive is begun only if its precondition holds in the last observation. Rule 2: the world is observed after
 every primitive; an unexpected observation triggers a check of the remaining plan. Rule 3: an unreachable goal is

@@ -1,9 +1,8 @@
 """Cheapest plans of a grounded task, found by A* with a given estimate of the remaining cost.
 
-g:       cost of the operators from the start to a state.
-h:       estimated cost from a state to the goal; infinite if the goal is unreachable.
-f:       g + weight · h; the state with the least f is expanded next.
-upper:   upper bound on the cost of a plan; states with g + cut · h at or above this bound are dropped.
+`g` is the cost of the operators from the start to a state. `h` is the estimated cost from a state to the goal; it is infinite
+if the goal is unreachable. `f` is g + weight · h; the state with the least f is expanded next. `upper` is an upper bound on the
+cost of a plan; states with g + cut · h at or above this bound are dropped.
 
 If h is a lower bound and the weight is 1, the search finds a cheapest plan, and no plan is cheaper than the least f of the open
 states. The lower bounds are `nothing` (breadth-first search), `ways` (each goal separately) and LM-cut

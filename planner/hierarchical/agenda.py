@@ -1,9 +1,9 @@
 """The agenda: the planner achieves the goals one after another on one table and keeps the achieved goals.
 
-open: goals that the planner tries to achieve in one step of the most abstract level. asleep: blocked goals; a goal wakes when a
-symbol that it waits for changes. kept: achieved goals; later steps may violate achieved goals temporarily, but must restore the
-goals. before: ordering constraints; a goal waits for other goals that would become unreachable (a cup is moved before it is
-filled).
+`open` contains goals that the planner tries to achieve in one step of the most abstract level. `asleep` contains blocked goals;
+a goal wakes when a symbol that it waits for changes. `kept` contains achieved goals; later steps may violate these goals
+temporarily, but must restore them. `before` contains ordering constraints: a goal waits for other goals that would become
+unreachable (a cup is moved before it is filled).
 
 If no goal is achieved in one step, the agenda raises the search budget gradually, on each level from the top. A failed
 attempt is repeated only after a symbol on which the goal depends has changed. Each step is refined and applied as soon

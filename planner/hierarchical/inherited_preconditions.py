@@ -79,7 +79,7 @@ def _inherited(
 def _unseen_values(
     problem: Problem, behavior: Behavior, effect: ValueEffect, level: int
 ) -> Iterator[tuple[Condition, ...]]:
-    """Yield an alternative for each invisible value of an effect; a level doesn't restrict values that it doesn't see."""
+    """For each value of an effect that the level doesn't see, yield an alternative that allows the value."""
     kinds = behavior.kinds
     values = problem.classes.get(kinds[effect.value], ()) if effect.value in kinds else (effect.value,)
     unknown = [value for value in values if problem.value_levels.get(value, 1) > level]

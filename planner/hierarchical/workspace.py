@@ -1,11 +1,11 @@
 """The common data of all searches of one call: the table of current values, the bound behaviours, and the budget.
 
-table:    the current values of all symbols; changes are made in place and can be undone.
-forward:  for each behaviour, a function of its arguments that returns its changes, or None if the behaviour isn't applicable.
-achieve:  for each effect, a function of a symbol and a value that yields the arguments with which the effect achieves the value.
-keep:     a function of a symbol and its first value that returns the required final value, or None if any value is allowed.
-budget:   the work of all searches, in units of about a microsecond; a search of a scope costs states times operators, and an
-          expansion costs 100.
+`table` contains the current values of all symbols; changes are made in place and can be undone. `forward` contains a function
+for each behaviour; given the arguments, it returns the changes, or None if the behaviour isn't applicable. `achieve` contains a
+function for each effect; given a symbol and a value, it yields the arguments with which the effect achieves the value. `keep`
+is a function of a symbol and its first value; it returns the required final value, or None if any value is allowed. The budget
+is the work of all searches, in units of about a microsecond. A search of a scope costs states times operators, and an expansion
+costs 100.
 """
 
 from __future__ import annotations

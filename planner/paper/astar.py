@@ -1,10 +1,9 @@
 """A* as Algorithm 1 of the paper intends; the function f contains the cogency ranking score of eqs. (3) and (5).
 
-g:   cost of the behaviours from the start to a node.
-h:   estimated cost from a node to the goal: the number of situated object symbols that don't match the goal.
-c:   cogency term of the behaviour that led to a node, computed in the state before the behaviour; not accumulated.
-f:   g + h + c; the node with the least f is expanded next; among nodes with equal f, the node that was generated first.
-n:   depth of a node.
+`g` is the cost of the behaviours from the start to a node. `h` is the estimated cost from a node to the goal: the number of
+situated object symbols that don't match the goal. `c` is the cogency term of the behaviour that led to a node, computed in the
+state before the behaviour; it isn't accumulated. `f` is g + h + c; the node with the least f is expanded next, and among nodes
+with equal f, the node that was generated first. `n` is the depth of a node.
 
 Algorithm 1 as printed never puts the start into the open set, has no closed set, and overwrites parents without comparing g.
 This implementation puts a state into the open set again only if the new g is smaller. The goal test compares only the symbols

@@ -289,9 +289,9 @@ def _events(timed: TimedPlan) -> Iterator[StepEvent]:
 class Run:
     """A simulated execution.
 
-    `timed` is the plan with its actual times, or None if primitives remain; `slots` contains the begun primitives in the order of
-    the plan; `waiting` contains the primitives that were held back; `said` maps each goal that was late or expected to be late
-    to the first time at which this was known.
+    `timed` is the plan with its actual times, or None if primitives remain. `slots` contains the begun primitives in the order
+    of the plan. `waiting` contains the primitives that were held back. `said` maps each goal that was late, or expected to be
+    late, to the first time at which this was known.
     """
 
     timed: TimedPlan | None
