@@ -53,6 +53,8 @@ class ReportJson(TypedDict):
     status: str
     success: SuccessJson
     trusted: dict[str, int]
+    perturb: bool
+    noise: float
     rollouts: list[SeenRolloutJson]
 
 
@@ -62,7 +64,8 @@ class Report(metaclass=RightNames):
     """The report of a verification: the rollouts (executions in simulation) of a plan, and the film of the first rollout.
 
     A rollout is good if every primitive had the expected effects and no final observation contradicts a goal. Effects on
-    situation types that no perceiver reads aren't verified; `trusted` has the numbers of these effects.
+    situation types that no perceiver reads aren't verified; `trusted` has the numbers of these effects. `perturb` and `noise` are
+    the parameters of `verify`.
     """
 
     plan: Plan
@@ -71,6 +74,8 @@ class Report(metaclass=RightNames):
     video: Path | None = None
     trusted: Mapping[str, int] = field(default_factory=dict)
     scene: Known | None = field(default=None, repr=False, compare=False)
+    perturb: bool = False
+    noise: float = 0.0
 
     @property
     def verified(self) -> bool:
@@ -115,6 +120,8 @@ class Report(metaclass=RightNames):
             "status": "verified" if self.verified else "failed",
             "success": {"verified": self.good, "of": len(self.rollouts), "interval": interval, "poured": self.poured},
             "trusted": dict(self.trusted),
+            "perturb": self.perturb,
+            "noise": self.noise,
             "rollouts": [{**rollout.as_json(), "seen": self._seen(rollout)} for rollout in self.rollouts],
         }
 
@@ -297,7 +304,7 @@ def verify(
     except (ValueError, RuntimeError) as error:
         raise KnowledgeError(str(error)) from error
     wanted = scene.problem.only(scene.problem.weights).goal if goal is None else goal
-    return Report(plan, wanted, tuple(finished), video, on_trust(scene, expected), scene)
+    return Report(plan, wanted, tuple(finished), video, on_trust(scene, expected), scene, perturb, noise)
 
 
 def on_trust(scene: Known, expected: Sequence[State]) -> dict[str, int]:

@@ -138,7 +138,8 @@ def read_report(scene: Known, verdicts: Path, plan: Plan) -> Report:
         )
         if not rollouts:
             raise ValueError("no rollouts")
-        return Report(plan, scene.problem.goal, rollouts, None, dict(data["trusted"]), scene)
+        varied = bool(data.get("perturb", False)), float(data.get("noise", 0.0))
+        return Report(plan, scene.problem.goal, rollouts, None, dict(data["trusted"]), scene, *varied)
 
 
 @contextmanager

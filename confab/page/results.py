@@ -219,8 +219,9 @@ def again_of(scene: Known, problem: Problem, report: Report | None, execution: E
         return join(["confab", "execute", name, *(["--world", "pybullet"] if physical else []), *people])
     if report is not None:
         many, seed = len(report.rollouts), report.rollouts[0].seed
-        options = [*(["--rollouts", str(many)] if many > 1 else []), *(["--seed", str(seed)] if seed else [])]
-        return join(["confab", "verify", name, "PLAN.json", *options])
+        given = {"--rollouts": many * (many > 1), "--seed": seed, "--noise": report.noise}
+        options = [part for option, value in given.items() if value for part in (option, str(value))]
+        return join(["confab", "verify", name, "PLAN.json", *options, *(["--perturb"] if report.perturb else [])])
     first = scene.problem.goal
     goals = [str(Fact(symbol, value)) for symbol, value in sorted(problem.goal.items()) if first.get(symbol) != value]
     return join(["confab", "plan", name, *(f"--goal={goal}" for goal in goals)])

@@ -8,6 +8,7 @@ from click.testing import CliRunner
 
 import confab
 from confab.cli import app
+from confab.page.data import page_data
 from confab.sim.verdict import Verdict
 from confab.sim.verify import Rollout, StepReport
 
@@ -43,12 +44,14 @@ def test_verdicts_come_back_as_they_were_saved(scene: confab.Scene, tmp_path: Pa
         Rollout(3, False, (*steps[:2], StepReport(plan.plan.primitives[2], lost, 0.5)), (0.9,), 1.0, 2.5),
         Rollout(4, True, tuple(steps), (), 1.0, 2.5, seen),
     )
-    report = confab.Report(plan.plan, scene.problem.goal, rollouts, None, {"HAND_TILT": 2}, scene)
+    report = confab.Report(plan.plan, scene.problem.goal, rollouts, None, {"HAND_TILT": 2}, scene, True, 0.002)
     file = tmp_path / "verify.json"
     file.write_text(json.dumps(report.json()))
     again = scene.read_report(file, plan)
     assert again.json() == report.json()
     assert (again.summary(), again.good, again.verified) == (report.summary(), 0, False)
+    command = "confab verify beverage-serving PLAN.json --rollouts 2 --seed 3 --noise 0.002 --perturb"
+    assert page_data(scene, report=again)["again"] == command
     with pytest.raises(confab.KnowledgeError, match="give the plan that was verified"):
         scene.read_report(file, scene.plan("cup1 LOCATION location6"))
 
