@@ -16,7 +16,8 @@ from confab.planner.plan import Step
 from confab.planner.solve import Request, solve
 from confab.planner.timed.call import in_time
 from confab.planner.timed.dispatch import Dispatch, simulated
-from confab.planner.timed.measuring import Statistics, measured, with_durations
+from confab.planner.timed.measuring import measured, with_durations
+from confab.reasoner.memory.experience import Statistics
 from confab.reasoner.symbols import Problem
 from worlds.families import family
 

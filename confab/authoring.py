@@ -33,7 +33,7 @@ CATALOG = """<?xml version="1.0" encoding="UTF-8" standalone="no"?>
 {entries}
 </catalog>
 """
-SPEAKS = "behavior does situationType relation termType ofClass first then refines isValueOf becomesValueOf"
+SPEAKS = "behavior does situationType relation termType ofClass first then refines isValueOf becomesValueOf byActor"
 TERMS = [CORE + name for name in SPEAKS.split()]
 WORDS = [CORE + name for name in ("asks", "answer")]
 """Properties whose values are texts with names of terms."""
@@ -294,7 +294,10 @@ def _renamed(quad: ox.Quad, table: dict[str, str], words: dict[str, str]) -> ox.
         value = ox.NamedNode(table.get(value.value, value.value))
     elif isinstance(value, ox.Literal) and quad.predicate.value in WORDS:
         value = ox.Literal(re.sub(r"\w+", lambda match: words.get(match[0], match[0]), value.value))
-    return ox.Triple(quad.subject, quad.predicate, value)
+    subject: Any = quad.subject
+    if isinstance(subject, ox.NamedNode):
+        subject = ox.NamedNode(table.get(subject.value, subject.value))
+    return ox.Triple(subject, quad.predicate, value)
 
 
 def _parse(memory: Path) -> tuple[list[ox.Quad], dict[str, str]]:

@@ -285,6 +285,7 @@ def episode_json(episode: Episode) -> EpisodeJson:
         "initial": [_situated(symbol, value, 0.0) for symbol, value in sorted(episode.initial.items())],
         "course": [_situated(seen.symbol, seen.value, seen.seconds) for seen in episode.course],
         "seconds": {name: round(value, 6) for name, value in episode.seconds.items()},
+        "measured": episode.measured,
     }
 
 

@@ -218,6 +218,7 @@ class EpisodeJson(TypedDict):
     initial: list[SeenJson]
     course: list[SeenJson]
     seconds: dict[str, float]
+    measured: bool
 
 
 class BecauseJson(TypedDict):

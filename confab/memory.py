@@ -29,6 +29,7 @@ from confab.reasoner.memory.experience import (
     Method,
     Order,
     Rule,
+    Statistics,
     Tally,
 )
 from confab.reasoner.memory.experience_file import FORMAT, Lines, new_replica, parse, probability, pull, push, turtle
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from confab.known import Known
     from confab.labels import Labels
     from confab.lifted import Sayings
+    from confab.physics import Report
     from confab.planner.acting.episode import Episode
     from confab.planner.experience.advice import Memory as Advisor
     from confab.reasoner.symbols import Problem
@@ -233,12 +235,41 @@ class Memory(metaclass=RightNames):
         """
         from confab.planner.experience.lessons import live
 
+        self.measure(problem, episode)
         begun = replace(problem, initial=episode.initial, goal=episode.goal)
         failures = list(failed_steps(problem, episode))
         whole = not episode.interventions and not episode.failures
         with suppress(LearningError):  # the executed steps aren't applicable in the first observed state
             if whole or failures:
                 live(self.experience, begun, episode.done if whole else Plan(()), failures=failures)
+
+    def measure(self, problem: Problem, done: Episode | Report) -> None:
+        """Learn the durations of the primitives that succeeded in an episode, or in the rollouts of a plan in physics.
+
+        The durations in a symbolic world are assumed, and aren't learned.
+        """
+        from confab.planner.acting.episode import Episode
+        from confab.planner.timed.measuring import measured
+
+        if not isinstance(done, Episode):
+            reports = [report for rollout in done.rollouts for report in rollout.steps]
+            self.experience.measure(measured(problem, [(r.step, r.seconds) for r in reports if r.verdict.ok]))
+        elif done.measured:
+            events = [(event.step, event.end - event.begin) for event in done.events if event.ok]
+            self.experience.measure(measured(problem, events))
+
+    @property
+    def statistics(self) -> Statistics:
+        """The measured durations by behaviour and actor, of all trusted replicas; the empty actor stands for all actors."""
+        return self.experience.statistics({self.experience.replica, *self.trusted})
+
+    def durations(self, most: int | None = None) -> Table:
+        """Return a table of the measured durations in seconds, for all actors and for each actor."""
+        rows = [
+            (behavior, actor or "all", f"{one.mean:.3f}", f"{one.spread:.3f}", f"{one.count}")
+            for (behavior, actor), one in sorted(self.statistics.items())
+        ]
+        return Table(("behaviour", "actor", "mean", "spread", "count"), tuple(rows[:most]))
 
     def save(self, target: str | Path) -> Path:
         """Write the memory into a Turtle file or to a SPARQL endpoint, and return the target.
@@ -330,7 +361,12 @@ class Memory(metaclass=RightNames):
         for record, rules in self.told(most):
             lines += ["", f"{record}:", *(f"  – {rule}" for rule in rules)]
         others = self.also()[:most]
-        return "\n".join([*lines, *(["", "Besides:"] if others else []), *(f"  – {other}" for other in others)])
+        lines += [*(["", "Besides:"] if others else []), *(f"  – {other}" for other in others)]
+        lasting = [
+            f"  – {behavior} by {actor}: {mean} s ± {spread} s, {counted(int(str(count)), 'execution')}"
+            for behavior, actor, mean, spread, count in self.durations(most)
+        ]
+        return "\n".join([*lines, *(["", "Measured durations:"] if lasting else []), *lasting])
 
     def also(self) -> list[str]:
         """Return, as sentences with counts, the learned orders of goals and the learned methods."""

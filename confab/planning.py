@@ -240,12 +240,19 @@ def _plan(
         reason = Reason(f"{ours}; an installed engine was asked {'before' if soon else 'then'}: {theirs}")
         return replace(outcome, reason=reason, seconds=perf_counter() - began)
 
+    def lasting(problem: Problem) -> Problem:
+        if memory is None or isinstance(memory, Links):
+            return problem
+        from confab.planner.timed.measuring import with_durations
+
+        return with_durations(problem, memory.statistics)
+
     timed = None
     in_part = problem is seen.problem and not seen.whole
     if needs_others_meanwhile(problem):
         if problem.weights:
             raise KnowledgeError("a task whose steps must overlap can't have soft goals; drop the :weight of its goals")
-        problem = problem if seen.whole else whole()
+        problem = lasting(problem if seen.whole else whole())
         outcome, timed = concurrent(problem, deadline)
         queries = scene.knowledge.round_trips - asked
         seconds = {**scene.seconds, "quantify": quantified}
@@ -272,6 +279,7 @@ def _plan(
         if anew != seen.problem:
             in_part = False
             problem, outcome = chosen(anew)
+    problem = lasting(problem)
     if outcome.status is Status.UNSOLVABLE and may_overlap_by_need(problem):
         outcome, timed = concurrent(problem, deadline)
     elif asks_for_times(problem, options.minimise):

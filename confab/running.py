@@ -120,6 +120,8 @@ def run(job: Job) -> int:
             if has_content(job.memory):  # another process may have changed the file
                 remembered = Memory.load(job.memory, scene)
             remembered.learn(scene, result)
+            if report is not None:
+                remembered.measure(scene.problem, report)
             remembered.save(job.memory)
     files = written(scene, result, report, remembered if job.memory else None, job)
     for what, path in {"memory": job.memory, **files}.items() if job.memory and good else files.items():

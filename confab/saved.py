@@ -82,6 +82,7 @@ def read_episode(scene: Known, path: Path) -> Execution:
                 (Discovery(one["individual"], tuple(one["classes"]), text=one["text"]), float(one["seconds"]))
                 for one in data.get("discovered", [])
             ),
+            measured=data.get("measured") is True,
         )
     return Execution(scene, episode)
 

@@ -42,6 +42,14 @@ if TYPE_CHECKING:
 )
 @click.option("--plan", "demonstration", type=PATH, metavar="PLAN.json", help="Learn from this plan only.")
 @click.option(
+    "--episode",
+    "lived",
+    type=PATH,
+    multiple=True,
+    metavar="EPISODE.json",
+    help="Learn from this output of 'confab execute --json' only; repeatable.",
+)
+@click.option(
     "--plot", type=Output(PICTURE), metavar="FILE", help="Draw expansions over the episodes: PNG, SVG or PDF."
 )
 @click.option(
@@ -57,12 +65,13 @@ def learn(
     scenes: tuple[str, ...],
     memory: Path,
     demonstration: Path | None,
+    lived: tuple[Path, ...],
     plot: Path | None,
     rounds: int | None,
     time_limit: float | None,
     as_json: bool,
 ) -> None:
-    """Learn from solutions of scenes, or from a demonstration."""
+    """Learn from solutions of scenes, from a demonstration, or from episodes."""
     from confab.curve import Curve, require_drawable
     from confab.interchange import read_plan
     from confab.memory import MOST_LINKS, Memory, undisturbed
@@ -82,8 +91,11 @@ def learn(
             if plot is not None:
                 curve.measure(name, loaded, remembered)
             links = remembered.links
-            if demonstration:
-                remembered.learn(loaded, read_plan(demonstration, loaded.problem))
+            if demonstration or lived:
+                if demonstration:
+                    remembered.learn(loaded, read_plan(demonstration, loaded.problem))
+                for episode in lived:
+                    remembered.live(loaded.problem, loaded.read_episode(episode).episode)
                 advance(f"learned {name}", 2)
             else:
                 result = loaded.plan()
@@ -138,7 +150,7 @@ def migrate(memory: Path, renames: tuple[str, ...]) -> None:
 @click.option("--most", type=click.IntRange(min=1), default=30, metavar="N", help="Maximum number of rows.")
 @AS_JSON
 def show(memory: str, most: int, as_json: bool) -> None:
-    """Show the learned rules, orders of goals and methods of a memory."""
+    """Show the learned rules, orders of goals, methods and durations of a memory."""
     from confab.memory import Memory
     from confab.scene import scenes
 
@@ -148,7 +160,8 @@ def show(memory: str, most: int, as_json: bool) -> None:
         loaded = Memory.load(memory, load_scene(name))
     if as_json:
         rules, also = loaded.advice(most).records(), loaded.also()[:most]
-        show_result({"memory": memory, "summary": repr(loaded), "rules": rules, "also": also})
+        lasting = loaded.durations(most).records()
+        show_result({"memory": memory, "summary": repr(loaded), "rules": rules, "also": also, "durations": lasting})
     else:
         show_result(loaded.page(most))
 

@@ -33,9 +33,9 @@ from confab.commands.options import (
 from confab.examples import examples
 from confab.planner.solve import DEFAULT_MODE, Mode
 from confab.progress import progress
-from confab.reasoner.files import check_folder
+from confab.reasoner.files import check_folder, has_content
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.kinds import EPISODE, FILM, PICTURE, PLAN, REPORT, VERDICTS
+from confab.reasoner.kinds import EPISODE, FILM, MEMORY, PICTURE, PLAN, REPORT, VERDICTS
 from confab.terminal import EXIT, GAVE_UP, NO, YES, limited, remark, show_result, told
 
 if TYPE_CHECKING:
@@ -200,6 +200,9 @@ def run(
 @click.option("--video", type=Output(FILM), metavar="OUT.mp4", help="Film the first rollout.")
 @GUI
 @click.option(
+    "--memory", type=Output(MEMORY), metavar="FILE", help="Write the measured durations into this memory file."
+)
+@click.option(
     "-o", "--output", "out", type=Output(VERDICTS), metavar="VERDICTS.json", help="Write the verdicts into this file."
 )
 @TIME_LIMIT
@@ -215,6 +218,7 @@ def verify(
     perturb: bool,
     video: Path | None,
     gui: bool,
+    memory: Path | None,
     out: Path | None,
     time_limit: float | None,
     as_json: bool,
@@ -240,6 +244,13 @@ def verify(
         )
     if not (perturb or noise):  # with perturbations, a failure in one rollout says nothing about the scene
         keep(loaded, refuted_in(loaded, report))
+    if memory is not None:
+        from confab.memory import Memory, undisturbed
+
+        with undisturbed(memory):
+            remembered = Memory.load(memory, loaded) if has_content(memory) else Memory.of(loaded)
+            remembered.measure(loaded.problem, report)
+            remembered.save(memory)
     if out is not None:
         from confab.reasoner.files import write_whole
 

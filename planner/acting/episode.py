@@ -186,6 +186,8 @@ class Episode:
         Behaviours that motion planning found impossible in a situation and that the executive replaced.
     discovered : tuple of (Discovery, float)
         Individuals that the world found and the scene doesn't contain, with the time of discovery.
+    measured : bool
+        Whether the world's clock is measured; the durations of a symbolic world are assumed.
     """
 
     scene: str
@@ -205,6 +207,7 @@ class Episode:
     course: tuple[Seen, ...] = ()
     refuted: tuple[Refutation, ...] = ()
     discovered: tuple[tuple[Discovery, float], ...] = ()
+    measured: bool = True
 
 
 @dataclass(frozen=True)

@@ -180,7 +180,7 @@ class _Run:
         clock = 0.0
         with suppress(WorldError):
             clock = self.world.seconds
-        return self.record.episode(self.belief.problem, clock, tuple(self.waiting))
+        return self.record.episode(self.belief.problem, clock, tuple(self.waiting), self.world.measured)
 
     def say(self, what: str, step: Step | None = None, expected: Iterable[Fact] = (), text: str = "") -> None:
         """Notify the observer of an event, if the episode has an observer."""

@@ -53,8 +53,8 @@ class Record:
         if reason not in self.reasons:
             self.reasons.append(reason)
 
-    def episode(self, task: Problem, clock: float, missed: tuple[Intervention, ...]) -> Episode:
-        """Return the recorded episode with the final task."""
+    def episode(self, task: Problem, clock: float, missed: tuple[Intervention, ...], measured: bool) -> Episode:
+        """Return the recorded episode with the final task; `measured` states whether the clock is measured."""
         return Episode(
             task.scene,
             self.status,
@@ -73,4 +73,5 @@ class Record:
             tuple(self.course),
             tuple(self.refuted),
             tuple(self.discovered),
+            measured,
         )

@@ -31,6 +31,9 @@ class SymbolicWorld:
     fault : callable, optional
     """
 
+    measured = False
+    """Whether the clock is measured: durations in this world are assumed, so that nothing is learned from them."""
+
     def __init__(
         self, problem: Problem, seconds_of: Mapping[str, float] | None = None, fault: FaultInjection | None = None
     ) -> None:

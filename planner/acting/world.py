@@ -212,6 +212,11 @@ class Guarded:
         with _asking("seconds"):
             return float(self.world.seconds)
 
+    @property
+    def measured(self) -> bool:
+        """Whether the world's clock is measured; true unless the world has an attribute `measured` that is false."""
+        return bool(getattr(self.world, "measured", True))
+
 
 @contextmanager
 def _asking(call: str) -> Iterator[None]:

@@ -62,8 +62,9 @@ def of_any_plan(problem: Problem) -> Fraction:
 def _durations(problem: Problem, task: Task) -> tuple[list[float], list[int], int]:
     """Return the least duration and the number of actors of each operator, and the number of all actors."""
     resting, facts, named = default_actors(problem), Facts(problem, problem.initial), set[str]()
+    by_actor = problem.times is not None and bool(problem.times.of_actors)
     fixed: dict[str, tuple[Parameter, ...]] = {}
-    constant: dict[str, float | None] = {}
+    constant: dict[tuple[str, tuple[str, ...]], float | None] = {}
     lasts, actors = list[float](), list[int]()
     for operator in range(len(task)):
         name, arguments, bindings = task.describe(operator)
@@ -73,18 +74,19 @@ def _durations(problem: Problem, task: Task) -> tuple[list[float], list[int], in
         if name not in fixed:
             fixed[name] = pieces_of(problem, behavior).fixed
         terms = tuple(given.get(t.name, t.name) for t in (*behavior.parameters, *fixed[name]))
-        if name not in constant:
+        acting = actors_of(problem, behavior, terms, resting)
+        key = name, acting if by_actor else ()
+        if key not in constant:
             stated = timing_of(behavior).duration
             same = stated is None or isinstance(stated, Fraction)
             seconds = duration_of(problem, behavior, terms, facts) if same else None
-            constant[name] = None if seconds is None else float(seconds)
+            constant[key] = None if seconds is None else float(seconds)
             if stated is not None and situations_in(stated):
-                constant[name] = 0.0
-        its = constant[name]
+                constant[key] = 0.0
+        its = constant[key]
         if its is None:
             seconds = duration_of(problem, behavior, terms, facts)
             its = 0.0 if seconds is None else float(seconds)
-        acting = actors_of(problem, behavior, terms, resting)
         named.update(acting)
         lasts.append(its)
         actors.append(len(acting))

@@ -1,10 +1,13 @@
 """Learned experience: rules, orders of goals and methods, with tallies of their use.
 
 ==========  ===================================================================================================
-Rule        a behaviour that achieves a kind of goal under some conditions Order       a kind of goal that is achieved before
-another kind, if two such goals share individuals Method      steps that refine a behaviour, with roles as arguments GoalKind
-the goals of one situation type about individuals of one class Tally       numbers of times that an item was chosen successfully,
-was passed over, and failed Experience  all learned items, with grow-only tallies by replica and epoch, which can be merged
+Rule        a behaviour that achieves a kind of goal under some conditions
+Order       a kind of goal that is achieved before another kind, if two such goals share individuals
+Method      steps that refine a behaviour, with roles as arguments
+GoalKind    the goals of one situation type about individuals of one class
+Tally       numbers of times that an item was chosen successfully, was passed over, and failed
+Measured    durations of a behaviour: number of executions, mean and spread
+Experience  all learned items, with grow-only tallies by replica and epoch, which can be merged
 ==========  ===================================================================================================
 
 Rules, orders, methods and kinds of goals are named by a hash of their content. Equal items of two replicas therefore have equal
@@ -16,9 +19,10 @@ individuals (for example between two hands), whose weight decays with later epis
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import sqrt
 from typing import TypeAlias
 
 from confab.reasoner.symbols import Condition, ValueCondition
@@ -166,6 +170,51 @@ class Tally:
         )
 
 
+DIGITS = 6
+"""Number of decimal places of means and spreads in seconds."""
+
+
+@dataclass(frozen=True, order=True)
+class Measured:
+    """The measured durations of a behaviour: the number of executions, and the mean and standard deviation in seconds."""
+
+    count: int
+    mean: float
+    spread: float = 0.0
+
+    @classmethod
+    def of(cls, seconds: Sequence[float]) -> Measured:
+        """Return the statistics of one or more durations.
+
+        >>> Measured.of([1.0, 2.0, 3.0])
+        Measured(count=3, mean=2.0, spread=1.0)
+        """
+        mean = sum(seconds) / len(seconds)
+        squares = sum((one - mean) ** 2 for one in seconds)
+        return cls(len(seconds), round(mean, DIGITS), round(sqrt(squares / max(len(seconds) - 1, 1)), DIGITS))
+
+    def __add__(self, other: Measured) -> Measured:
+        """Return the statistics of the executions of both.
+
+        >>> Measured.of([1.0]) + Measured.of([2.0, 3.0]) == Measured.of([1.0, 2.0, 3.0])
+        True
+        """
+        count, apart = self.count + other.count, other.mean - self.mean
+        squares = sum(one.spread**2 * (one.count - 1) for one in (self, other))
+        squares += apart**2 * self.count * other.count / count
+        mean = self.mean + apart * other.count / count
+        return Measured(count, round(mean, DIGITS), round(sqrt(squares / (count - 1)), DIGITS))
+
+
+Statistics: TypeAlias = "Mapping[tuple[str, str], Measured]"
+"""Measured durations by behaviour and actor; an empty name of the actor stands for all actors."""
+
+
+def duration_name(key: tuple[str, str]) -> str:
+    """Return the hash-based name of the durations of a behaviour and an actor."""
+    return _named("duration", key)
+
+
 @dataclass
 class Lesson:
     """The items that were learned in one episode, with their tallies; `personal` contains preferences between individuals."""
@@ -201,6 +250,7 @@ class Experience:
         Other replicas whose experience is used for planning.
     disabled : set of name
         Learned items that aren't used for planning.
+    durations : mapping of replica to (behaviour, actor) to Measured
 
     Examples
     --------
@@ -218,6 +268,7 @@ class Experience:
     counts: dict[tuple[str, int], Counts] = field(default_factory=dict)
     trusts: set[str] = field(default_factory=set)
     disabled: set[str] = field(default_factory=set)
+    durations: dict[str, dict[tuple[str, str], Measured]] = field(default_factory=dict)
 
     def learn(self, lesson: Lesson) -> None:
         """Add the lesson of one episode."""
@@ -229,8 +280,23 @@ class Experience:
                 table = self.counts.setdefault((self.replica, at), {}).setdefault(one.name, {})
                 table[fact] = table.get(fact, Tally()) + tally
 
+    def measure(self, found: Statistics) -> None:
+        """Add measured durations of this replica."""
+        self.episodes.setdefault(self.replica, 0)
+        own = self.durations.setdefault(self.replica, {})
+        own.update({key: own[key] + one if key in own else one for key, one in found.items()})
+
+    def statistics(self, replicas: Collection[str]) -> Statistics:
+        """Return the durations that some replicas measured, without disabled ones."""
+        found: dict[tuple[str, str], Measured] = {}
+        for replica, known in self.durations.items():
+            for key, one in known.items():
+                if replica in replicas and duration_name(key) not in self.disabled:
+                    found[key] = found[key] + one if key in found else one
+        return found
+
     def merge(self, other: Experience) -> None:
-        """Merge another memory into this one: of two copies of a tally, the greater numbers are kept.
+        """Merge another memory into this one: of two copies of a tally or a statistic, the greater one is kept.
 
         Merges can be repeated, and made in any order.
         """
@@ -240,6 +306,9 @@ class Experience:
         for who, name, fact, tally in other:
             table = self.counts.setdefault(who, {}).setdefault(name, {})
             table[fact] = table.get(fact, Tally()) | tally
+        for replica, known in other.durations.items():
+            mine = self.durations.setdefault(replica, {})
+            mine.update({key: max(one, mine.get(key, one)) for key, one in known.items()})
 
     def totals(self) -> Counts:
         """Return the tallies of epoch 0, summed over all replicas, by name and fact."""

@@ -6,6 +6,9 @@ on each of these links has the numbers `:chosen`, `:passedOver` and `:failed`, a
 share a counter, and all other nodes are named by their content, so that the union of two files contains both memories. A rule
 that was edited in the file keeps its tallies.
 
+A `:DurationStatistic` exists for each replica, behaviour and actor. The property `:durationStatistic` links the behaviour to
+it, and an ``owl:Axiom`` on this link has the numbers `:mean`, `:spread` and `:count`.
+
 Each link is written as one line, which is read by a regular expression. Files in another layout, such as that of Protégé, are read
 by the Turtle parser.
 """
@@ -18,6 +21,7 @@ import uuid
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import astuple, dataclass, field
 from functools import cached_property
+from math import isfinite
 from pathlib import Path
 from urllib.parse import quote
 
@@ -25,7 +29,7 @@ import pyoxigraph as ox
 
 from confab.reasoner.files import write_whole
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.memory.experience import ITSELF, Experience, Fact, Said, Tally
+from confab.reasoner.memory.experience import DIGITS, ITSELF, Experience, Fact, Measured, Said, Tally, duration_name
 from confab.reasoner.memory.rules_file import RuleReader, RuleWriter, Words, label
 from confab.reasoner.names import Names
 from confab.reasoner.vocabulary import CORE, MEMORY, OWL, RDFS
@@ -45,6 +49,12 @@ LINK = (
     "m:{counter} :associatedWith m:{pattern} . [] a owl:Axiom ; owl:annotatedSource m:{counter} ; "
     "owl:annotatedProperty :associatedWith ; owl:annotatedTarget m:{pattern} ; "
     ":chosen {t.chosen} ; :passedOver {t.passed_over} ; :failed {t.failed} ; :probability {p:.4f} .\n"
+)
+DURATION = (
+    "m:{name} a owl:NamedIndividual, :DurationStatistic ; rdfs:label {label}{actor} ; :replica {replica}{off} . "
+    "{behavior} :durationStatistic m:{name} . [] a owl:Axiom ; owl:annotatedSource {behavior} ; "
+    "owl:annotatedProperty :durationStatistic ; owl:annotatedTarget m:{name} ; "
+    ":mean {one.mean:.{digits}f} ; :spread {one.spread:.{digits}f} ; :count {one.count} .\n"
 )
 MOST = 2**53  # larger counts aren't exact as floating-point numbers
 COUNTS = re.compile(
@@ -175,6 +185,19 @@ def turtle(
                     )
                 target = name if fact == ITSELF else facts[fact]
                 yield LINK.format(counter=counter, pattern=target, t=tally, p=probability(tally))
+    for replica, known in sorted(experience.durations.items()):
+        for (behavior, actor), lasted in sorted(known.items()) if only in (None, replica) else ():
+            name = duration_name((behavior, actor))
+            yield DURATION.format(
+                name=f"{name}_{_digest(replica)}",
+                label=_text(f"{behavior} by {actor}" if actor else behavior),
+                actor=f" ; :byActor {writer.term(actor)}" if actor else "",
+                replica=_text(replica),
+                off=" ; :enabled false" if name in experience.disabled else "",
+                behavior=writer.term(behavior),
+                one=lasted,
+                digits=DIGITS,
+            )
 
 
 def _digest(text: str) -> str:
@@ -278,6 +301,7 @@ def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: 
             if not 0 <= min(tally.chosen, tally.passed_over, tally.failed) <= sum(astuple(tally)) < MOST:
                 raise ValueError(f"{counter} counts {tally}; wanted numbers from 0 to {MOST}")
             tallies[fact] = tallies[fact] | tally if fact in tallies else tally
+        _durations(experience, reader)
         for replica, epoch in experience.counts:
             if epoch > (lived := experience.episodes.get(replica, epoch)):
                 raise ValueError(
@@ -288,6 +312,27 @@ def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: 
     except (KeyError, ValueError, IndexError) as error:
         raise KnowledgeError(f"{source}: broken memory: a rule, link or counter lacks a part ({error})") from error
     return experience
+
+
+def _durations(experience: Experience, reader: RuleReader) -> None:
+    """Add the measured durations in the nodes of a reader; raise `ValueError` for a number that is out of range."""
+    for subject, node in reader.nodes.items():
+        target = node.get(OWL + "annotatedTarget", [""])[0]
+        if "mean" not in node or target not in reader.nodes:  # a statistic was deleted, for example in Protégé
+            continue
+        statistic = reader.nodes[target]
+        actor = reader.short(reader.one(target, "byActor")) if "byActor" in statistic else ""
+        key = reader.short(reader.one(subject, OWL + "annotatedSource")), actor
+        count = _count(reader.one(subject, "count"), "count")
+        one = Measured(count, *(round(float(reader.one(subject, part)), DIGITS) for part in ("mean", "spread")))
+        if not count or not (isfinite(one.mean + one.spread) and min(one.mean, one.spread) >= 0):
+            raise ValueError(
+                f"{' '.join(key)} lasts {one}; wanted a count from 1 on, and a mean and a spread from 0 on"
+            )
+        known = experience.durations.setdefault(reader.one(target, "replica"), {})
+        known[key] = max(one, known.get(key, one))
+        if "false" in statistic.get("enabled", ()):
+            experience.disabled.add(duration_name(key))
 
 
 def _count(text: str, what: str) -> int:

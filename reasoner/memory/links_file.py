@@ -84,10 +84,13 @@ def memory_names(path: Path, found: Lines | None = None) -> tuple[str, Names]:
     scenes = [text(row[0]) for row in graph.select(imported)]
     if not scenes:
         raise KnowledgeError(f"{path}: no memory: it imports no scene (owl:imports)")
+    spoken = """SELECT DISTINCT ?said ?term WHERE {
+      { ?node ?said ?term FILTER(isIRI(?term)) } UNION { ?term :durationStatistic ?node BIND(:durationStatistic AS ?said) }
+    }"""
     return scenes[0], Names(
         text(term)
-        for said, term in graph.select("SELECT DISTINCT ?said ?term WHERE { ?node ?said ?term FILTER(isIRI(?term)) }")
-        if text(said).startswith(CORE) and not text(term).startswith(MEMORY)  # the terms of links and rules
+        for said, term in graph.select(spoken)
+        if text(said).startswith(CORE) and not text(term).startswith(MEMORY)  # the terms of links, rules and durations
     )
 
 

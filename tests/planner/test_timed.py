@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 import confab
+from confab.memory import Memory
 from confab.planner.hierarchical.planner import plan
 from confab.planner.plan import Limits, Outcome, Reason, Status
 from confab.planner.solve import Request, solve
@@ -20,6 +21,7 @@ from confab.planner.timed.validation import validate_timed
 from confab.reasoner.generate import write_scene
 from confab.reasoner.graph.knowledge import load
 from confab.reasoner.limits import within
+from confab.reasoner.memory.experience import Measured
 from confab.reasoner.reading.problem import read
 from confab.reasoner.symbols import (
     TRUE,
@@ -292,3 +294,18 @@ def test_measured_durations_give_each_hand_its_own_speed() -> None:
     assert again is not None
     assert {slot.end - slot.begin for slot in again.slots if slot.actors == ("left_hand",)} == {Fraction(3)}
     assert {slot.end - slot.begin for slot in again.slots if slot.actors == ("right_hand",)} == {Fraction(1)}
+
+
+def test_measured_durations_are_used_where_none_is_stated(tmp_path: Path) -> None:
+    (tmp_path / "shelves.ttl").write_text(SHELVES.replace('c:duration "PT3S"^^xsd:dayTimeDuration ; ', ""))
+    scene = confab.load(tmp_path / "shelves.ttl")
+    memory = Memory.of(scene)
+    memory.experience.measure(
+        {("TAKE", ""): Measured(5, 9.0), ("PUT", ""): Measured(5, 4.0), ("PUT", "arm2"): Measured(2, 1.5)}
+    )
+    timed = scene.plan(["b1 AT s1", "b3 AT s2"], memory, minimise="makespan").timed
+    assert timed is not None
+    lasting = {(slot.step.behavior, slot.actors[0]): float(slot.end - slot.begin) for slot in timed.slots}
+    known = {("TAKE", "arm1"): 2.0, ("TAKE", "arm2"): 2.0, ("PUT", "arm1"): 4.0, ("PUT", "arm2"): 1.5}
+    assert lasting.items() <= known.items()
+    assert timed.least <= timed.bound <= timed.makespan == 6
