@@ -91,7 +91,8 @@ class _Choices:
     def outcome(self, kept: Goals) -> Outcome:
         """Return the outcome of planning for a choice.
 
-        If a limit ends a search, the outcome has the status "gave up". The first search raises `LimitError` instead.
+        If a limit ends a search, the outcome has the status "gave up". If a limit ends the first search, the method raises
+        `LimitError` instead.
         """
         if kept not in self.outcomes:
             try:

@@ -182,7 +182,7 @@ class Attempt:
 
     @property
     def limits(self) -> MotionLimits:
-        """The hand's limits of speed and acceleration, lower with a load."""
+        """The hand's limits of speed and acceleration; the limits are lower with a load."""
         limits = self.hand.limits
         return limits if self.held is None else replace(limits, hand_velocity=0.9, hand_acceleration=3.0)
 

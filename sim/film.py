@@ -69,7 +69,7 @@ class Film:
     path : str or Path
         ``.mp4`` or ``.gif``; its folder must exist.
     steps : sequence of PrimitiveStep
-        The primitives, for the plan strip.
+        The primitives that the plan strip shows.
     titles : mapping of path to text
         Captions of steps, by the path of the step in the plan's tree. Steps above the primitives are shown only if they have a
         caption.

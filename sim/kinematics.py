@@ -39,7 +39,7 @@ def inverse(arm: Arm, r: Array, p: Array, swivel: Array, margin: float = 0.0, fo
     Returns
     -------
     q : array (n, k), radians
-        Undefined where `valid` is false.
+        The postures; they are undefined where `valid` is false.
     valid : array (n,) of bool
         Whether the point is in reach and every joint is within its limits. Only one of the two postures of a spherical joint is
         considered, so that neighbouring poses have neighbouring postures. The middle joint of the considered posture is within

@@ -31,7 +31,7 @@ EXACT, CLOSE = 1e-10, 1e-7
 DAMPING = 1e-6
 """Damping of the normal equations in proportion to the error, in addition to half of the squared error.
 
-More damping is slower. Less damping makes the search unstable.
+With more damping, the search is slower. With less damping, the search is unstable.
 """
 
 SINGULAR = 0.45

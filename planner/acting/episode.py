@@ -177,7 +177,7 @@ class Episode:
         The interventions that took place, with the times of their beginning.
     replans : tuple of Replan
     failures : tuple of Failure
-        Experience for the memory.
+        The failed primitives, from which the memory learns.
     missed : tuple of Intervention
         The interventions that didn't take place, because the episode ended earlier.
     course : tuple of Seen

@@ -38,7 +38,7 @@ class Memory:
     ----------
     experience : Experience
     trusted : bool
-        Whether its rules may be used.
+        Whether the rules of the experience may be used.
     """
 
     experience: Experience

@@ -68,7 +68,7 @@ class Instances:
     call : Call
     rules : iterable of Rule
     allowance : Allowance
-        Counts the effort of matching.
+        The allowance, which counts the effort of matching rules.
     score : function of an instance, optional
         Of equally cheap instances, the one with the greatest score is tried first.
     joins : dict, optional

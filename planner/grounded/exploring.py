@@ -56,7 +56,7 @@ def explore(task: Task, order: SearchOrder) -> Iterator[int]:
     Raises
     ------
     MemoryError
-        The states need more than `MOST_BYTES`.
+        The states need more memory than `MOST_BYTES`.
     """
     reached, each = order.reached, STATE_BYTES + task.size // 4
     first = Candidate(task.initial, (), task.initial, 0.0)

@@ -56,7 +56,7 @@ def ground(
     level : int, optional
         The level to ground, by default the lowest level.
     initial, goal : State, optional
-        By default the initial state and the goal of the problem.
+        The initial state and the goal; by default, those of the problem.
     most : int
         Maximum number of rows of one join.
     deadline : float, optional

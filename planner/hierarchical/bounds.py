@@ -80,7 +80,8 @@ def _proved(problem: Problem, best: Outcome, limits: Limits, deadline: float | N
     """Return a lower bound on the cost of a plan, and a cheaper plan if the search finds one.
 
     Symbols that are initially at rest must be at rest in the end. A symbol that is initially not at rest must end at rest if a
-    step changes the symbol. The search ignores the second condition. Therefore the bound is valid, but the plan may be invalid.
+    step changes the symbol. The search ignores the condition on symbols that are initially not at rest. Therefore the bound is
+    valid, but the plan may be invalid.
     """
     level = problem.domain.levels[-1]
     problem = replace(problem, goal=problem.goal_on(level))

@@ -101,7 +101,7 @@ class Methods:
         del known[METHODS:]
 
     def lifted(self, behavior: str, steps: Sequence[Ground], individuals: tuple[str, ...]) -> Method:
-        """Return steps that refined a behaviour as a method.
+        """Return a method that consists of the steps that refined a behaviour.
 
         `individuals` become the first roles of the method. All other individuals become open roles.
         """

@@ -92,7 +92,7 @@ class _Course:
         self.table.undo(0)
 
     def now(self) -> Seen:
-        """Return what the level sees of the table."""
+        """Return the values of the table that the level sees."""
         now, levels = self.table.now, self.problem.value_levels
         values = (now[cell[0]].get(cell[1], FALSE) for cell in self.place)
         return tuple("" if levels.get(value, 1) > self.level else value for value in values)

@@ -1,10 +1,10 @@
 """The necessary order of activities: precedences, and turns that can be exchanged.
 
-Two accesses to the same symbol conflict if at least one access changes the symbol. Conflicting accesses keep the order
-of the sequence. Therefore every schedule is equivalent to the sequence. Turns are an exception. A *turn* is a part of
-the sequence that changes a symbol from its first value and back again. The turns of a symbol can be taken in any order,
-one at a time. The turns of an actor include all symbols about the actor. For example, each turn of a hand picks up and
-puts down an object.
+Two accesses to the same symbol conflict if at least one access changes the symbol. Conflicting accesses keep the order of the
+sequence. Therefore every schedule is equivalent to the sequence. Turns are an exception: their order may change. A *turn* is a
+part of the sequence that changes a symbol from its first value and back again. The turns of a symbol can be taken in any order,
+one at a time. The turns of an actor include all symbols about the actor. For example, each turn of a hand picks up and puts
+down an object.
 
 The theory is described by Bäckström, "Computational aspects of reordering plans", JAIR 9 (1998). Turns are blocks in the sense of
 Siddiqui and Haslum, "Block-structured plan deordering", AI 2012.

@@ -51,7 +51,7 @@ MOST_KNOWN = 4
 MOST_COMPILED = 200
 """Maximum number of crews for which behaviours are compiled; at this number, the search bars no further actors or steps."""
 HALF, PREFERRED, EARLY = 0.5, 0.8, 0.25
-"""Three probabilities of changes.
+"""Probabilities of kinds of changes.
 
 `HALF` is the probability that an actor is barred instead of a step. `PREFERRED` is the probability that a change concerns a task on
 the critical path. `EARLY` is the probability that a late step becomes an early task.
