@@ -5,8 +5,8 @@ leaves the arm one degree of freedom, the *swivel*. If all three axes of the wri
 angle about the line from shoulder to wrist. At swivel 0 the elbow hangs down, or points up if the upper arm points up at the
 zero posture. If the last axis misses the intersection of the two axes before it (Franka's Panda), the swivel is the angle of
 the last joint from the middle of its limits, minus the roll of the hand. For a given swivel, the other six joints have a closed
-form. `confab.sim.numeric` solves arms without a closed form. Without a closed form, the swivel is the angle of the third joint
-from the middle of its limits if the arm has seven joints, and always 0 if the arm has six joints.
+form. `confab.sim.numeric` solves arms without a closed form. In an arm without a closed form, the swivel is the angle of the
+third joint from the middle of its limits (seven joints), or always 0 (six joints).
 
 Arrays have these names: ``q`` are postures (n, k) of k joints in radians, ``R`` are rotations (n, 3, 3), ``p`` are points (n,
 3) in metres, and ``a`` are axes. S, E and W are shoulder, elbow and wrist.

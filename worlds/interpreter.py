@@ -47,7 +47,7 @@ Terms = Mapping[str, str]
 State = tuple[Any, ...]
 Node = tuple[State, frozenset[int]]
 NOTHING = math.nan
-"""The value of a missing number: a comparison with a missing number is false, and a calculation gives a missing number."""
+"""The value of a missing number: a comparison with a missing number is false, and the result of a calculation is missing, too."""
 
 
 class TooManyStatesError(Exception):
@@ -55,7 +55,7 @@ class TooManyStatesError(Exception):
 
 
 def divided(one: Any, other: Any) -> Any:
-    """Return a quotient; the missing number if the divisor is zero or a number is missing."""
+    """Return a quotient, or `NOTHING` if the divisor is zero or a number is missing."""
     if other == 0 or other != other or one != one:
         return NOTHING
     result = Fraction(one) / Fraction(other)

@@ -21,7 +21,7 @@ from confab.reasoner.symbols import (
 
 
 def has(situation: str, *terms: str) -> ValueCondition:
-    """Return the condition that a situation type, with all terms but the last as arguments, has the last term as its value."""
+    """Return a condition on a value of a situation type: the last term is the value, and the other terms are the arguments."""
     return ValueCondition(situation, terms[:-1], terms[-1])
 
 

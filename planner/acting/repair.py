@@ -238,8 +238,8 @@ def difference(old: Iterable[Step], new: Iterable[Step]) -> tuple[int, int]:
 def _finish(call: Call, pending: list[Step], wanted: State) -> None:
     """Apply the unexecuted sub-steps of the step in progress until all symbols are at rest, and remove the step from `pending`.
 
-    If the sub-steps don't lead to rest, or achieve only values that are no longer goals, no sub-step is applied; the
-    step in progress is then dropped, unless all symbols are at rest already.
+    No sub-step is applied if the sub-steps don't lead to rest, or if they achieve only former goals. The step in progress is
+    then dropped, unless all symbols are at rest already.
     """
     mark = len(call.table.trail)
     for count, step in enumerate(pending, 1):

@@ -6,9 +6,9 @@ leading    rules are used regardless of their record
 strict     rules aren't used; their record is still updated when an episode is learned
 =========  ====================================================================================================
 
-On every level, rules are tried for goals and for refinements before a search begins
-(`confab.planner.experience.following`). Only the search can prove that there is no plan. Experience isn't used if the
-memory isn't trusted, has no rules for the goals, or has never achieved goals of the same kinds.
+On every level, rules are tried for goals and for refinements before a search begins (`confab.planner.experience.following`).
+Only the search can prove that there is no plan. Experience is used only if the memory is trusted, has rules for the goals, and
+has already achieved goals of the same kinds.
 """
 
 from __future__ import annotations

@@ -24,8 +24,8 @@ Flags: TypeAlias = NDArray[np.bool_]
 class Bit:
     """A derived bit, represented by a mask.
 
-    The bit is set if a state has all bits of one alternative. If `opposite`, the bit is set if a state has all bits of no
-    alternative.
+    The bit is set if a state has all bits of one alternative. An `opposite` bit is set if a state lacks at least one bit of
+    every alternative.
     """
 
     mask: int

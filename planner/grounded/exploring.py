@@ -51,7 +51,7 @@ class SearchOrder(Protocol):
 
 
 def explore(task: Task, order: SearchOrder) -> Iterator[int]:
-    """Explore states until the order has no more candidates; yield the work of each turn.
+    """Explore states until the search order has no more candidates; after each turn of the order, yield the work of the turn.
 
     Raises
     ------

@@ -237,7 +237,7 @@ class Refiner:
         return {cell: value for cell, value in found.items() if not meets(now[cell[0]].get(cell[1], FALSE), value)}
 
     def wrong_value(self, mark: int, targets: Mapping[Cell, str], keep: Keep) -> Cell | None:
-        """Return a target or a changed symbol without its required value, or None if there is no such symbol.
+        """Return a target or a changed symbol whose value isn't the required value, or None if there is no such symbol.
 
         Changed symbols are symbols that were set since a marked state.
         """

@@ -184,9 +184,9 @@ def problem_of(
 def with_frozen(space: Workspace, level: int, inside: AbstractSet[str]) -> set[str]:
     """Return the individuals in focus together with the frozen individuals.
 
-    The values of individuals in focus are frozen, and the values of these values, and so on. If a behaviour quantifies
-    over individuals, an individual is also frozen if its value is an individual of the scope, or if a static relation
-    contains both individuals.
+    The values of individuals in focus are frozen, and the values of these values, and so on. If a behaviour quantifies over
+    individuals, two more kinds of individuals are frozen: individuals whose value is an individual of the scope, and
+    individuals that a static relation relates to an individual of the scope.
     """
     program, table = space.program, space.table
     behaviors = program.domain.at_level(level)

@@ -269,8 +269,7 @@ def _slack(
 def _ordered(problem: Problem, timed: TimedPlan) -> TimedPlan | None:
     """Return a timed plan whose steps are sorted in the order of the schedule, so that they form a valid plan in sequence.
 
-    If the sorted steps aren't a valid plan, return the given timed plan; return None if the steps of the given timed
-    plan aren't a valid plan either.
+    If the sorted steps aren't a valid plan, return the given timed plan if its steps are a valid plan, otherwise None.
     """
     own = None if validate(problem, timed.plan) else timed
     numbers = {slot.step.path: i for i, slot in enumerate(timed.slots)}

@@ -174,7 +174,7 @@ def _sole(cell: Cell, actors: Mapping[str, None]) -> bool:
 
 
 def _turns(groups: Sequence[Sequence[_Record]], ends: Mapping[int, int]) -> tuple[Turn, ...]:
-    """Return the turns of several symbols together; each group contains the accesses to one symbol."""
+    """Return the common turns of several symbols; each group contains the accesses to one symbol."""
     first = [next(r.written[0] for r in records if r.written is not None) for records in groups]
     order = sorted(
         ((record.position, i, record) for i, records in enumerate(groups) for record in records),

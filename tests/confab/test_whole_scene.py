@@ -98,7 +98,7 @@ def walk(problem: Problem, chance: Random) -> Plan:
 @settings(max_examples=30)
 @given(text=worlds(), seed=st.integers(0, 1000))
 def test_what_the_scene_refuses_is_what_is_wrong_in_the_whole_scene(forgetful: Forgetful, text: str, seed: int) -> None:
-    """If recognition loses an individual, the scene refuses exactly those plans of the part that are invalid in the whole scene."""
+    """If recognition loses an individual, the scene refuses a plan exactly if the plan is invalid in the whole scene."""
     with TemporaryDirectory() as folder:
         graph = graph_of(text, Path(folder))
     whole = read(graph)
