@@ -11,10 +11,10 @@ from collections.abc import Mapping
 MODULE = {
     "confab.load(SCENE).plan(engine=ENGINE)": "lama fast_downward pyperplan enhsp tamer aries lpg ff engines engine get_engine",
     "confab -v (in a shell)": "set_log_level logging verbose debug log_level set_verbosity logger quiet",
-    "confab run (in a shell)": "run_demo run_example quickstart",
+    "confab run (in a shell), or confab.load(SCENE).execute()": "run run_demo run_example quickstart",
     "confab.load(SCENE)": "load_ttl read_owl load_rdf open read read_scene load_scene load_file load_ontology "
     "from_file parse World Ontology Problem Graph KnowledgeGraph Environment Env env get_ontology connect "
-    "from_graph from_string from_text loads load_domain load_problem Domain Robot Task get_scene get_problem "
+    "from_graph from_string from_text loads load_domain load_problem Domain Task get_scene get_problem "
     "import_scene open_scene make gym Kitchen reader OWLReader Model Dataset Store kb infer knowledge_base "
     "PlanningProblem new_problem from_name SceneGraph import_ontology",
     "confab.scenes()": "list_scenes list_examples available_scenes datasets samples examples catalog list all_scenes "
@@ -27,7 +27,7 @@ MODULE = {
     "prepareQuery",
     "confab.load(SCENE).verify()": "verify simulate simulation Simulator PlanValidator SequentialPlanValidator "
     "validate_plan check_plan rollout physics Simulation sim pybullet test_plan verify_plan Verifier",
-    "confab.load(SCENE).execute()": "execute run act step Executor Agent run_scene execute_plan dispatch perform "
+    "confab.load(SCENE).execute()": "execute act step Executor Agent run_scene execute_plan dispatch perform "
     "tick rollout_plan run_plan start Runner BehaviorTree episode Monitor act_loop replay PlanExecutor Executive "
     "Controller Dispatcher",
     "confab.load(SCENE).explain()": "explain why explanation justify why_not Explainer reasons",
@@ -72,6 +72,7 @@ MODULE = {
     "confab mcp (in a shell)": "mcp tools agents llm",
     "confab --help (in a shell)": "main cli command_line commands",
     "confab fetch URL (in a shell)": "fetch download pull",
+    "confab.load(SCENE).embodiment.robots": "Robot robot robots Arm arms",
     "confab.load(SCENE).facts": "facts State state initial_state",
 }
 COPY = "copy clone duplicate deepcopy fork snapshot"
@@ -92,14 +93,14 @@ SCENE = {
     "query": "ask sparql select sparql_query execute_query run_query search_one rows fetch question queries "
     "get_results",
     "with_fact": "add_fact set_fact set add assert_fact update change tell put set_value set_initial_value "
-    "remove_fact retract insert delete remove assume modify set_init set_state assign replace with_facts "
+    "remove_fact retract insert assume modify set_init set_state assign replace with_facts "
     "set_property edit add_facts set_initial del_fact update_fact add_init observe_fact set_initial_state move "
     "fluent_value with_init without patch apply_fact set_location place_object put_on move_to set_position teleport "
     "put_object move_object",
     "with_goal": "set_goal add_goal with_goals set_goals replace_goal add_goals remove_goal change_goal set_task "
     "clear_goals delete_goal del_goal update_goal new_goal add_task reset_goals set_target new_task want "
     "achieve_goal",
-    "graph.remove(TRIPLE)": "remove_object remove_triple delete_object destroy_entity remove_individual remove_node "
+    "graph.remove(TRIPLE)": "remove delete remove_object remove_triple delete_object destroy_entity remove_individual remove_node "
     "remove_objects delete_individual destroy",
     "graph.add(TRIPLE)": "set_pose add_triple add_object add_individual new_individual add_instance insert_object "
     "create_object add_node add_edge "
@@ -116,7 +117,7 @@ SCENE = {
     "solve find_plan make_plan planner plan_to run_planner get_plan replan compute_plan plan_for "
     "solve_for astar policy find_solution plan_task reach achieve optimise optimize solution solver plan_goal plans "
     "plan_all possible_plans all_plans plan_with plan_tree",
-    "verify": "simulate simulation check check_plan validate_plan physics rollout verify_plan rollouts test "
+    "verify": "simulate simulation check_plan validate_plan physics rollout verify_plan rollouts test "
     "monte_carlo is_valid_plan sim simulate_plan evaluate test_plan run_simulation check_physics",
     "execute": "pick place grasp pour move_base navigate navigate_to drive goto "
     "run act apply step dispatch perform tick execute_plan run_plan do play replay rollout_plan start "
@@ -174,7 +175,7 @@ SCENE = {
     "load open read parse from_file load_scene from_string from_graph load_file from_rdf "
     "reload loads import_file from_pddl from_ttl read_file from_json from_dict from_path from_url include reset "
     "restore undo from_name create make build new from_scene from_yaml from_owl from_text",
-    "confab.validate(FILE)": "violations shacl_report "
+    "confab.validate(FILE)": "check violations shacl_report "
     "is_valid validate is_consistent check_consistency consistent lint shacl errors valid "
     "sync_reasoner warnings check_scene inconsistent_classes validation problems consistency",
     "confab.generate(FAMILY)": "generate random sample random_scene",
