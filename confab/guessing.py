@@ -16,7 +16,7 @@ from difflib import SequenceMatcher, get_close_matches
 from functools import cache
 from importlib import import_module
 
-from confab.hints import COMMANDS, HINTS, OPTIONS
+from confab.hints import COMMANDS, HINTS, NEEDLESS, OPTIONS
 
 CLASSES = {
     "scene": "confab.scene.Scene",
@@ -371,6 +371,15 @@ def chosen(name: str, known: Iterable[str]) -> str:
     worth = {each: score(words_of(name), each, "") for each in known}
     best = max(worth, key=lambda each: worth[each], default="")
     return best if worth.get(best, 0.0) >= ENOUGH else ""
+
+
+def needless(name: str) -> str:
+    """Return why a function or a command that lacks a parameter doesn't need it, or an empty text.
+
+    >>> needless("random_state")
+    'the same call gives the same result in every process'
+    """
+    return whole(NEEDLESS, name.lstrip("-").replace("-", "_").lower())
 
 
 def command(name: str, known: Iterable[str]) -> str:

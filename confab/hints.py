@@ -705,3 +705,9 @@ OPTIONS = {
 
 If a key contains several names, the first one that the called function or command accepts is suggested.
 """
+NEEDLESS = {
+    "the same call gives the same result in every process": "seed random_seed random_state rng set_seed",
+    "the option -v of a command prints the duration of each stage": "verbose verbosity debug log_level loglevel log "
+    "show_progress progress_bar",
+}
+"""Reasons why some functions and commands don't have a parameter, each with names for such a parameter."""

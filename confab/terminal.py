@@ -244,7 +244,7 @@ def by_options(text: str) -> str:
 
 def _in_place_of(option: str, context: click.Context) -> str:
     """Return what to use in place of an unknown option: another option, an argument, or an option of other commands."""
-    from confab.guessing import chosen
+    from confab.guessing import chosen, needless
     from confab.reasoner.names import nearest
 
     def names(command: click.Command | None) -> list[str]:
@@ -257,6 +257,8 @@ def _in_place_of(option: str, context: click.Context) -> str:
             return f"; give {each.metavar} without the name of an option"
     if meant := chosen(option, names(context.command)):
         return f"; did you mean '{meant}'?"
+    if why := needless(option):
+        return f"; {why}"
     plainly = {name.lstrip("-"): name for name in names(context.command)}
     if near := nearest(option.lstrip("-"), plainly):
         return near.replace("'", "'--", 1)

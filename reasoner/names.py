@@ -123,7 +123,7 @@ def _ontology_name(iri: str) -> str:
 FEW_NAMES = 40
 """Maximum number of names that are listed in an error if no name is similar to the wrong name."""
 GUESSING: list[str] = []
-"""Modules with functions `guessed` and `chosen` that determine the meaning of a wrong name; `confab` adds one module."""
+"""Modules with functions `guessed`, `chosen` and `needless` for the meaning of a wrong name; `confab` adds one module."""
 
 
 class RightNames(ABCMeta):
@@ -261,9 +261,10 @@ def right_arguments(function: Callable[P, R], bound: int = 0) -> Callable[P, R]:
         for name in named:
             if name not in takes:
                 meant = next((import_module(each).chosen(name, takes) for each in GUESSING), "")
+                why = next((import_module(each).needless(name) for each in GUESSING), "")
                 all_of_them = ", ".join((*several, *takes)) or "no arguments"
-                hint = f"; did you mean '{meant}'?" if meant else f"; it takes {all_of_them}"
-                raise TypeError(f"{function.__name__}() takes no '{name}'{hint}")
+                hint = f"did you mean '{meant}'?" if meant else why or f"it takes {all_of_them}"
+                raise TypeError(f"{function.__name__}() takes no '{name}'; {hint}")
         if most is not None and len(given) > bound + most:
             named_only = ", ".join(f"{each}=" for each in own[most:])
             raise TypeError(

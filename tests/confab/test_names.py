@@ -345,7 +345,7 @@ def test_each_class_with_known_wrong_names_has_a_description(things: dict[str, o
 
 def test_values_are_represented_in_one_short_line(things: dict[str, object]) -> None:
     texts = {kind: repr(there) for kind, there in things.items() if kind not in ("plan", "table")}
-    assert {kind: text for kind, text in texts.items() if "\n" in text or len(text) > 300} == {}
+    assert {kind: text for kind, text in texts.items() if "\n" in text or len(text) > 320} == {}
     assert texts["behaviour"].startswith("Behavior(name='B1_MOVE', level=1, parameters: 2")
     assert texts["domain"].startswith("Domain(situations: 5, behaviors: 12")
 
