@@ -4,11 +4,10 @@ The first step is relaxed reachability, which determines the facts that can beco
 computation works backwards from the goal, so that only relevant facts are considered. A required fact that isn't reachable
 in the relaxed task never holds.
 
-If the relaxed goal is reachable, the second step distinguishes a few values, at first the values of the goal. Then the
-cases are searched; a case is a combination of the distinguished values. A path through the cases to the goal is
-executed on the original task. If the execution fails, the cases also distinguish the values on which the execution
-failed. The second step is repeated until no path remains and the task is unsolvable, or a path succeeds and there is a
-plan.
+If the relaxed goal is reachable, the second step distinguishes a few values, at first the values of the goal. Then the cases
+are searched; a case is a combination of the distinguished values. A path through the cases to the goal is executed on the
+original task. If the execution fails, the cases also distinguish the values on which the execution failed. The second step is
+repeated until no path remains (then the task is unsolvable), or until a path succeeds (then there is a plan).
 
 The last step distinguishes all values, so that each case is a state. A choice of distinguished values may have infinitely
 many cases, while another choice has only few cases. Therefore each choice is tried first with a small work limit, and then

@@ -1,9 +1,9 @@
 """Contrastive explanations: plan with an enforced alternative, or name the alternative's failing conditions.
 
-There are two kinds of alternatives: steps and choices. An alternative *step* replaces a step of the plan: the earlier
-steps are kept, the alternative step is refined and applied, and the later steps are planned again. An alternative
-*choice* enforces an individual for changes of a symbol: every behaviour that changes the symbol and has a suitable role
-must take this individual; the whole task is planned again.
+There are two kinds of alternatives: steps and choices. An alternative *step* replaces a step of the plan: the earlier steps are
+kept, the alternative step is refined and applied, and the later steps are planned again. An alternative *choice* prescribes an
+individual for the changes of a symbol: every behaviour that changes the symbol and has a suitable role must take this
+individual; the whole task is planned again.
 """
 
 from __future__ import annotations

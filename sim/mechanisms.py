@@ -117,7 +117,7 @@ def load_mechanism(client: int, mechanism: Mechanism) -> Mechanic:
 
 
 def _let_touch(mechanic: Mechanic) -> None:
-    """Disable collisions of links with each other or their base if they are stated to touch, or if they touch at joint values 0.
+    """Disable collisions between links, or between a link and the base, that are stated to touch or that touch at joint values 0.
 
     Raises
     ------

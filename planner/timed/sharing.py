@@ -159,7 +159,7 @@ def evenly_shared(problem: Problem, work: Fraction, makespan: Fraction) -> bool:
 
 
 def _actor_terms(problem: Problem, behavior: Behavior, resting: frozenset[str]) -> tuple[str, ...]:
-    """Return the parameters and the variables of a behaviour that denote actors."""
+    """Return those parameters and variables of a behaviour that denote actors."""
     stated = timing_of(behavior).actors
     if stated:
         return tuple(term for term in stated if term in behavior.kinds)
