@@ -80,7 +80,7 @@ class Sayings:
         """Return the goal of a rule as a sentence."""
         if rule.goal.value in (MORE, LESS):
             who = " ".join(map(self.name, rule.goal.arguments))
-            return f"{self.name(rule.goal.situation)} of {who} becomes {rule.goal.value}"
+            return f"the amount “{self.name(rule.goal.situation)}” of {who} {'in' if rule.goal.value == MORE else 'de'}creases"
         return self.fact(Fact(Symbol(rule.goal.situation, rule.goal.arguments), rule.goal.value))
 
     def rule(self, rule: Rule) -> str:

@@ -461,7 +461,7 @@ def _fact_told(
             found = with_choice(problem, outcome.plan or plan, Symbol(symbol.situation, symbol.arguments), by, ask)
         except NoChoiceError as error:
             return WhyNot(asked, str(error))
-        words += f", with {labels.name(by)} in every step that changes it"
+        words += f", with {labels.name(by)} in every step that changes {symbol}"
         found = replace(found, before=before)
     else:
         cost = None if outcome.plan is None else cost_of(problem, outcome.plan)

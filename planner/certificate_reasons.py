@@ -81,25 +81,31 @@ def told(problem: Problem, certificate: Certificate) -> Reason:
         if certificate.kind == "pair" and len(goals) == 2 and len(values) == 1 and goals[0].value not in (TRUE, FALSE):
             return Reason(f"{what} {how}: no reachable state has both", tuple(dict.fromkeys(terms)))
         which = "the only reachable combination" if one else f"none of the {certificate.cases} reachable combinations"
-        has = "doesn't have" if one else "has"
-        text = f"{what} {how}: {which} of values of {about} {has} {'all of them' if many else 'it'}"
+        has = "doesn't contain" if one else "contains"
+        text = f"{what} {how}: {which} of values of {about} {has} {'all of these goals' if many else 'this goal'}"
         return Reason(text, tuple(dict.fromkeys(terms)))
     try:
         chain, cause = _Causes(problem, certificate).chain()
     except (WorkLimitError, RecursionError):
-        chain, cause = [], Cause("no behaviour achieves it")
+        chain, cause = [], Cause("no behaviour has this effect")
     goal = certificate.unmet[0]
     follows = [claim for claim in reversed(chain) if claim.fact != goal]
     kept = [claim for claim in follows if certificate.always.get(claim.fact.symbol) == claim.fact.value]
     never = [claim for claim in follows if claim not in kept]
     so = "".join(
-        f"; so {what} {', '.join(map(str, facts[:SHOWN]))}" + f" and {len(facts) - SHOWN} more" * (len(facts) > SHOWN)
+        f"; so {_listed(facts)} {what} hold{'s' * (len(facts) == 1)}"
         for what, facts in (("always", kept), ("never", never))
         if facts
     )
     terms += [*cause.terms, *(word for claim in follows for word in _words(claim.fact))]
     named = dict.fromkeys(word for word in terms if not word.startswith("?"))
     return Reason(f"{goal} can't be reached: {cause.text}{so}", tuple(named))
+
+
+def _listed(claims: Sequence[Claim]) -> str:
+    """Return the first claims as text, with the number of the other claims."""
+    shown = [*map(str, claims[:SHOWN]), *([f"{len(claims) - SHOWN} more"] if len(claims) > SHOWN else [])]
+    return " and ".join(filter(None, (", ".join(shown[:-1]), shown[-1])))
 
 
 def _words(fact: Fact) -> tuple[str, ...]:
@@ -195,7 +201,7 @@ class _Causes:
             stays = self.certificate.always.get(symbol)
             return [Cause(f"{_named(symbol)} is always {stays}" if stays else self.bounds_of(symbol))]
         if not found:
-            what = "gives it another value" if kept else "has this effect"
+            what = f"gives {_named(symbol)} another value" if kept else "has this effect"
             return [Cause(f"no behaviour of level {lowest.level} {what}")]
         return sorted(found, key=lambda cause: (bool(cause.rests_on), cause.parts, len(cause.rests_on)))
 
@@ -308,7 +314,7 @@ class _Causes:
         )
         claims = [Claim(fact) for fact in view.claimed]
         if claims == [claim]:
-            return Cause(f"{behavior.name} requires that it holds already", (behavior.name, *names), (claim,))
+            return Cause(f"{behavior.name} requires that {claim} already holds", (behavior.name, *names), (claim,))
         (first, *more) = [substituted(condition, given) for condition in opened]
         if len(claims) > 1 and not more and isinstance(first, ValueCondition) and not first.negated:
             free = {term for term in (*first.arguments, first.value) if term.startswith("?")}
@@ -385,7 +391,7 @@ class _Causes:
         if len(core) == 1:
             condition = substituted(core[0], given)
             if isinstance(condition, ClassCondition) and not condition.negated:
-                return f"that {term(condition.term)} is {an(condition.kind)}, which it isn't"
+                return f"that {term(condition.term)} is {an(condition.kind)}, but {term(condition.term)} isn't"
             if isinstance(condition, RelationCondition) and not condition.negated and len(condition.arguments) == 2:
                 left, right = condition.arguments
                 if left.startswith("?"):

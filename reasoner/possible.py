@@ -158,7 +158,7 @@ def _had_twice(problem: Problem, state: State) -> Iterator[Impossible]:
                 other,
                 f"{first.arguments[0]} and {other.arguments[0]} have the same {situation}, {value}",
                 f"physics gives each value of {situation} to one {_owner(problem, situation)} at a time",
-                f"state another {situation} of one of them",
+                f"state another {situation} of one of the two",
             )
 
 

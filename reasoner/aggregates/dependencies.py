@@ -38,8 +38,8 @@ def in_order(aggregates: Mapping[str, Aggregate]) -> list[Aggregate]:
         if not ready:
             name = min(waiting)
             raise DomainError(
-                f"{name} is calculated from {' and '.join(sorted(read_by(waiting[name]) & waiting.keys()))}, "
-                f"and that from {name} in turn; take one of them out of its rule"
+                f"the rule of {name} reads {' and '.join(sorted(read_by(waiting[name]) & waiting.keys()))}, "
+                f"so {name} depends on itself; remove one of these amounts from its rule"
             )
         for name in ready:
             found[name] = waiting.pop(name)

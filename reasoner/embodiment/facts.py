@@ -119,7 +119,7 @@ class BodyFacts:
             if (folder / file).is_file():
                 return str(folder / file)
         raise EmbodimentError(
-            f"{node} has e:{camel(name)} '{file}', which is in none of: {', '.join(map(str, folders))}",
+            f"{node} has e:{camel(name)} '{file}', but this file isn't in {' or '.join(map(str, folders))}",
             node,
         )
 

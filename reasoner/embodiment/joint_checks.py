@@ -22,7 +22,7 @@ def joint_that_stays(embodiment: Embodiment) -> Iterator[Flaw]:
         if link.kind == "fixed" and (link.lower or link.upper):
             yield (
                 link.name,
-                f"{link.name} moves {reach}, but its e:joint is fixed, or not stated",
+                f"{link.name} moves {reach}, but its e:joint is fixed or not stated",
                 "a link without a joint of its own is rigid",
                 f'state e:joint "revolute" or "prismatic" of {link.name}, or drop e:lower and e:upper',
             )
@@ -48,13 +48,13 @@ def threshold_outside(embodiment: Embodiment) -> Iterator[Flaw]:
         if not link.lower <= link.shut < link.upper:
             wrong.append(f"shut up to {link.shut:g}")
         if not wrong and link.shut > link.opened:
-            wrong.append(f"open from {link.opened:g} on and shut up to {link.shut:g}, in between as both")
+            wrong.append(f"open from {link.opened:g} on and as shut up to {link.shut:g}, so that both overlap")
         for said in wrong:
             yield (
                 link.name,
                 f"the joint of {link.name} goes from {link.lower:g} to {link.upper:g}, and counts as {said}",
                 "the joint's value has to distinguish open from shut",
-                f"state numbers of {link.name} so that e:lower <= e:shut < e:opened <= e:upper",
+                f"correct the numbers of {link.name}: e:lower <= e:shut < e:opened <= e:upper",
             )
 
 
@@ -70,7 +70,7 @@ def feature_off_its_part(embodiment: Embodiment) -> Iterator[Flaw]:
                 yield (
                     touched[0].name,
                     f"{touched[0].name} is {away * 100:.0f} cm or more away from the feature {feature.name} of {link.name}, "
-                    "at which the fingers are to touch it",
+                    "where the fingers touch the part",
                     "the fingers would close on nothing",
                     f"correct the coordinates of {touched[0].name} or of the feature: both are in the frame of {link.name}",
                 )
@@ -91,8 +91,8 @@ def part_of_two(embodiment: Embodiment) -> Iterator[Flaw]:
                 yield (
                     part.name,
                     f"{part.name} is part of {first} and of {name}",
-                    "a solid moves with one link; a shared one would exist twice",
-                    f"give {name} a part of its own",
+                    "a solid moves with one link; a shared solid would exist twice",
+                    f"state a separate part for {name}",
                 )
 
 
@@ -115,11 +115,11 @@ def carried_off_its_surface(embodiment: Embodiment) -> Iterator[Flaw]:
         inside = [part for part, top in zip(near, tops, strict=True) if top - part.size[2] < z + SURFACE < top]
         ground = place.carrier in grounds and _on_ground(embodiment, grounds[place.carrier], place.position)
         if inside or not (ground or any(abs(top - z) < SURFACE for top in tops)):
-            where = f"inside {inside[0].name}" if inside else f"at no surface of {place.carrier}"
+            where = f"inside {inside[0].name}" if inside else f"not on a surface of {place.carrier}"
             yield (
                 place.name,
                 f"{place.name} is {where}: it is at ({x:g}, {y:g}, {z:g}) in the frame of {place.carrier}",
-                "an object put down there would fall, or doesn't fit",
+                "an object placed there would fall, or has no room",
                 f"give {place.name} the height of its supporting surface: e:z of that part plus half its sizeZ or height",
             )
 

@@ -19,7 +19,8 @@ def too_wide(embodiment: Embodiment) -> Iterator[Flaw]:
         if openings and width >= max(openings):
             yield (
                 name,
-                f"{name} is {width * 100:.1f} cm wide at its grasp height; the widest hand opens {max(openings) * 100:.1f} cm",
+                f"{name} is {width * 100:.1f} cm wide at its grasp height; the fingers of the widest hand open to "
+                f"{max(openings) * 100:.1f} cm",
                 "a hand grasps objects from the side, between two fingers",
                 "make the shape narrower at e:graspHeight, or state another e:graspHeight where it is narrower",
             )

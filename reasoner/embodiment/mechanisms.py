@@ -47,12 +47,12 @@ def _check_parents(facts: BodyFacts) -> None:
 def _no_mechanism(above: Sequence[str], parents: Sequence[str]) -> str:
     """Return the message for a link whose chain of parents `above` doesn't end at a mechanism."""
     if not parents:
-        why = f"{above[-1]} is neither an e:Mechanism nor part of one"
+        why = f"{above[-1]} is neither an e:Mechanism nor part of an e:Mechanism"
     elif len(parents) > 1:
         why = f"{above[-1]} has {len(parents)} values of e:partOf: {', '.join(parents)}"
     else:
-        why = f"{above[-1]} is e:partOf {parents[0]} in turn" if len(above) > 1 else "it is e:partOf itself"
-    return f"{above[0]} is part of no mechanism: {why}; state one e:partOf, a mechanism or a link of one"
+        why = f"e:partOf leads back to {parents[0]}" if len(above) > 1 else "e:partOf leads to the link itself"
+    return f"{above[0]} isn't part of a mechanism: {why}; state one e:partOf that leads to a mechanism or to a link of a mechanism"
 
 
 def _links(facts: BodyFacts, mechanism: str) -> list[str]:

@@ -63,7 +63,7 @@ def role_not_played(embodiment: Embodiment) -> Iterator[Flaw]:
         for phase, role in unplayed(use):
             yield (
                 phase.iri,
-                f"phase {phase.name} names the role {role}, which no term of {use.behavior} plays",
+                f"phase {phase.name} names the role {role}, but no term of {use.behavior} has this role",
                 f"the skill {use.skill} needs an individual in that role",
                 f"state e:role e:{role} of one of its parameters or variables, and e:asksFor e:{role} of the skill",
             )
@@ -77,7 +77,7 @@ def unknown_setting(embodiment: Embodiment) -> Iterator[Flaw]:
                 phase.iri,
                 f"phase {phase.name} of {use.skill} has '{camel(term)}', which is neither a number nor a setting of the skill",
                 "an expression is a sum of numbers and settings",
-                f"state e:{camel(term)} of the skill, or correct the spelling; one of your own is declared first: "
+                f"state e:{camel(term)} of the skill, or correct the spelling; declare a setting of your own first: "
                 f":{camel(term)} a owl:DatatypeProperty ; rdfs:subPropertyOf e:setting",
             )
 

@@ -118,13 +118,13 @@ def _phase(facts: BodyFacts, node: str) -> Phase:
         ("fingers", [found.fingers], FINGERS),
         ("bring", [found.bring], BROUGHT),
         ("when", found.when, CONDITIONS),
-        ("guard on", [guard.quantity for guard in (*found.until, *found.checks)], QUANTITIES),
-        ("guard with else", [guard.code for guard in (*found.until, *found.checks) if guard.code], VERDICTS),
+        ("quantity in a guard", [guard.quantity for guard in (*found.until, *found.checks)], QUANTITIES),
+        ("verdict in a guard", [guard.code for guard in (*found.until, *found.checks) if guard.code], VERDICTS),
     ):
         for word in said:
             if word not in known:
                 raise EmbodimentError(
-                    f"{node} has the {what} '{word}'; wanted one of {', '.join(filter(None, known))}", node
+                    f"{node} has an unknown {what}: '{word}'; use one of {', '.join(filter(None, known))}", node
                 )
     for expression in (*found.offset, found.above, found.value, found.speed, found.wait):
         if expression != "".join(match[0] for match in TERM.finditer(expression)):

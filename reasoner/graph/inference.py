@@ -137,6 +137,6 @@ def _refuse_merging(graph: KnowledgeGraph, one: str, other: str) -> None:
     stated = [(ox.NamedNode(a), same, ox.NamedNode(b)) for a, b in ((one, other), (other, one))]
     if not any(next(graph.store.quads_for_pattern(*pair, None), None) for pair in stated):
         raise KnowledgeError(
-            f"{local_name(one)} and {local_name(other)} would be one individual: a functional property has both as its "
-            "value. Drop one of the two facts; an owl:AllDifferent of both lets a reasoner find such a clash"
+            f"{local_name(one)} and {local_name(other)} would be one individual, because a functional property has both as its "
+            "values; drop one of the two facts, or state that the individuals are different, so that a reasoner finds the conflict"
         )

@@ -468,7 +468,7 @@ def _locate(iri: str, importer: Path, read: dict[Path, Mapping[str, Path]]) -> P
     web = iri.startswith(("http://", "https://"))
     fetch = f", or fetch it: confab fetch {iri} --into {importer.parent}" if web else ""
     raise KnowledgeError(
-        f"{importer}: imports <{iri}>, which neither {beside.name} beside it nor the shipped catalog knows; "
+        f"{importer}: imports <{iri}>, but neither {beside.name} in its folder nor the shipped catalog contains this IRI; "
         f"put its file beside this one or name it in the catalog{fetch} (nothing is fetched unasked)"
     )
 

@@ -227,8 +227,8 @@ def _rules(parts: Parts, schema: Schema, situations: Mapping[str, SituationType]
         found[name] = tuple(rules)
     for name, other in circles(found):
         raise KnowledgeError(
-            f"{name} is defined by {other} not being true, which is defined by {name} in turn: which of them holds can't be told; "
-            "take one of these conditions out of its rule",
+            f"{name} follows if {other} is false, and {other} depends on {name}, so the truth values of both are undefined; "
+            "remove one of these conditions from its rule",
             next((rule for iri, rules in written.items() if parts.names.short(iri) == name for rule in rules), None)
             or parts.names.iri(name),
         )
@@ -256,7 +256,7 @@ def _aggregates(
         situation = parts.one(iri, "situationType")
         name = parts.names.short(situation)
         if name in found:
-            raise KnowledgeError(f"<{iri}>: {name} has two rules; a derived amount has one", iri)
+            raise KnowledgeError(f"<{iri}>: {name} has two rules with an aggregate; keep one of the rules", iri)
         for effect in schema.of_kind("AmountEffect"):
             if list(parts.values(effect, "situationType")) == [situation]:
                 raise KnowledgeError(
@@ -300,11 +300,11 @@ def _constraints(parts: Parts, schema: Schema, situations: Iterable[SituationTyp
     for iri in sorted(schema.of_kind("SituationType"), key=parts.names.short):
         name, said = parts.names.short(iri), [word for word in ("never", "always") if parts.flag(iri, word)]
         if len(said) > 1:
-            raise KnowledgeError(f"<{iri}> is never and always true; keep one of them", iri)
+            raise KnowledgeError(f"<{iri}> has both c:never and c:always; keep one of the two", iri)
         if said and not known[name].boolean:
             raise KnowledgeError(
-                f"<{iri}>: c:{said[0]} constrains situation types that are true or false; {name} has other values. "
-                "Define a situation type by a rule about these values, and constrain that",
+                f"<{iri}>: c:{said[0]} needs a situation type that is true or false, but {name} has other values; "
+                "define a situation type by a rule about these values, and constrain that instead",
                 iri,
             )
         if said:

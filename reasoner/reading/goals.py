@@ -192,7 +192,8 @@ def _weight(parts: Parts, iri: str) -> Fraction | None:
     weight = parts.decimal(iri, "weight")
     if weight is not None and weight <= 0:
         raise KnowledgeError(
-            f"<{iri}>: the c:weight is {written(weight)}; wanted the cost of leaving the goal unmet, above 0", iri
+            f"<{iri}>: the c:weight is {written(weight)}; state the cost of leaving the goal unmet, a number greater than 0",
+            iri,
         )
     return weight
 

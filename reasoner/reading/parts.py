@@ -292,7 +292,7 @@ class Parts(NodeReader):
         if found is None:
             said = self.one(iri, name)[:40]
             raise KnowledgeError(
-                f"<{iri}>: c:{name} is '{said}'; wanted an xsd:dayTimeDuration that isn't negative, like PT2.5S"
+                f"<{iri}>: c:{name} is '{said}'; state a non-negative xsd:dayTimeDuration such as PT2.5S"
             )
         return found
 

@@ -131,8 +131,8 @@ def _checked(parts: Parts, schema: Schema, found: Past, iri: str) -> str:
     for said in ("fromLevel", "restValue", "defaultValue"):
         if parts.values(iri, said):
             raise KnowledgeError(
-                f"<{iri}> has a c:{said}; a situation type with c:remembers exists on the levels of the one that it remembers, is "
-                "false at first, and never becomes false again: leave it out",
+                f"<{iri}> has a c:{said}; a situation type with c:remembers exists on the levels of the remembered situation "
+                f"type, is false at first, and never becomes false again; drop c:{said}",
                 iri,
             )
     for effect in schema.of_kind("ValueEffect"):
@@ -149,11 +149,13 @@ def _check_boolean(parts: Parts, found: Past, iri: str, word: str, *both: str) -
     for one in both:
         name = parts.names.short(one)
         if not parts.is_a(one, "SituationType"):
-            raise KnowledgeError(f"<{iri}>: c:{word} names <{one}>, which is no situation type; name one", iri)
+            raise KnowledgeError(
+                f"<{iri}>: c:{word} names <{one}>, which isn't a situation type; name a situation type", iri
+            )
         if not found.situations[name].boolean:
             raise KnowledgeError(
-                f"<{iri}>: c:{word} is about situation types that are true or false, and {name} has other values; define a "
-                "situation type by a rule about these values, and use that",
+                f"<{iri}>: c:{word} needs situation types that are true or false, but {name} has other values; define a "
+                "situation type by a rule about these values, and use it instead",
                 iri,
             )
 
@@ -193,7 +195,8 @@ def remembers_in_order(domain: Domain, names: Names) -> dict[str, str]:
                 waiting += [*read, *([domain.remembers[other]] if other in domain.remembers else [])]
         if seen & circular(domain.rules):
             raise KnowledgeError(
-                f"{name} remembers {source}, which depends on a recursive definition; remember a situation type without one",
+                f"{name} remembers {source}, which depends on a recursive definition; remember a situation type without a "
+                "recursive definition",
                 names.iri(name),
             )
     order = [one.situation for one in in_order_of_update(domain)]

@@ -147,7 +147,7 @@ def link(row: Sequence[Term], blank: bool = False) -> Triple:
         if not (isinstance(term, ox.NamedNode) or (blank and isinstance(term, ox.BlankNode))):
             what = f"'{text(term)[:60]}', a text" if isinstance(term, ox.Literal) else "something without a name"
             raise KnowledgeError(
-                f"<{text(subject)}>: {local_name(text(predicate))} leads to {what}, where an individual belongs; name one"
+                f"<{text(subject)}>: {local_name(text(predicate))} has {what} as its value; name an individual instead"
                 + (", without quotation marks" if isinstance(term, ox.Literal) else "")
             )
     return text(subject), text(predicate), text(value)

@@ -88,8 +88,8 @@ class UpdateCompiler:
                 n for t in (*operation.delete, *operation.insert) for n in variables_in(t) if n in inner.chosen
             ]:
                 raise UpdateError(
-                    f"{lost[0]} would stand for all of its class, but an effect is about one individual",
-                    "make it a parameter by giving it its type in the first WHERE",
+                    f"{lost[0]} would denote all individuals of its class, but an effect is about one individual",
+                    "state its type in the first WHERE, so that it becomes a parameter",
                     lost[0].at,
                 )
             when = self.conditions.sought(inner, within, operation.at)
@@ -108,7 +108,7 @@ class UpdateCompiler:
         named = [word for word in variables_in(head) if word != rule.name]
         if rule.function and {*named} != rule.grouped:
             (lost, *_) = sorted({*named} ^ rule.grouped)
-            raise UpdateError(f"{lost} stands in the head or in GROUP BY, and not in both", SELECT, head.subject.at)
+            raise UpdateError(f"{lost} is in the head or in GROUP BY, but not in both", SELECT, head.subject.at)
         for name in named:
             if name in group.chosen:
                 kind = group.chosen.pop(name)

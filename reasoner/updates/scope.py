@@ -95,7 +95,7 @@ class Scope:
         prefix, _, name = word.partition(":")
         if prefix not in self.prefixes:
             raise UpdateError(
-                f"nothing says what the prefix '{prefix}:' stands for{nearest(prefix, self.prefixes)}",
+                f"the prefix '{prefix}:' isn't declared{nearest(prefix, self.prefixes)}",
                 f"declare it at the top of the file, or write PREFIX {prefix}: <…> before the update",
                 word.at,
             )
@@ -107,20 +107,18 @@ class Scope:
             return CORE + ("true" if said.value else "false")
         if isinstance(said, Number):
             raise UpdateError(
-                f"'{written(said.value)}' stands where an individual belongs",
+                f"the number {written(said.value)} is in the place of an individual",
                 "name an individual, or use a variable",
                 at,
             )
         if not said.variable:
             return self.iri(said)
         if said in self.numbers:
-            raise UpdateError(
-                f"{said} is a number, and stands where an individual belongs", "name an individual", said.at
-            )
+            raise UpdateError(f"{said} is a number in the place of an individual", "name an individual", said.at)
         if said not in known:
             raise UpdateError(
-                f"nothing says what {said} stands for",
-                f"give it a type where it begins ({said} a …) to choose or seek it, or let a situation determine it (… ?x {said})",
+                f"nothing determines the variable {said}",
+                f"state its type ({said} a …), or add a situation with {said} as its value (?x :property {said})",
                 said.at,
             )
         return self.terms[said]

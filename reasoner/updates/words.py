@@ -134,11 +134,13 @@ def constructed(text: str) -> tuple[Mapping[str, str], Construction]:
     """
     prologue, tree = _tree("QueryUnit", text, "CONSTRUCT query", CONSTRUCT)
     if tree.name != "ConstructQuery" or tree.datasetClause or not tree.template:
-        raise UpdateError("a rule is a CONSTRUCT query with a head", CONSTRUCT, 0)
+        raise UpdateError("a rule has to be a CONSTRUCT query with a head", CONSTRUCT, 0)
     heads = [triple for block in tree.template for triple in triples(block)]
     if len(heads) != 1:
         raise UpdateError(
-            f"the head of the rule has {len(heads)} patterns", "write one; write a rule for each", heads[-1].subject.at
+            f"the head of the rule has {len(heads)} patterns",
+            "write one pattern, and a separate rule for each further pattern",
+            heads[-1].subject.at,
         )
     if tree.where.name != "SubSelect":
         return _prefixes([prologue]), Construction(heads[0], parts(tree.where))
@@ -151,7 +153,7 @@ def _aggregated(head: Triple, select: Any) -> Construction:
     computed = [one for one in select.projection or () if one.evar]
     if len(computed) != 1 or select.having or select.orderby or select.limitoffset or select.valuesClause:
         raise UpdateError(
-            "the SELECT of a rule has one aggregate, without HAVING, ORDER BY, LIMIT and VALUES", SELECT, at
+            "the SELECT of a rule needs exactly one aggregate, without HAVING, ORDER BY, LIMIT and VALUES", SELECT, at
         )
     grouped = list(select.groupby.condition) if select.groupby else []
     shown = [one.var for one in select.projection if not one.evar]
@@ -163,7 +165,7 @@ def _aggregated(head: Triple, select: Any) -> Construction:
     found = AGGREGATE.fullmatch(getattr(inner, "name", ""))
     if not found:
         raise UpdateError(
-            "the SELECT of a rule computes something else than SUM, COUNT, MAX or MIN", SELECT, computed[0].evar.at
+            "the SELECT of a rule computes another function than SUM, COUNT, MAX and MIN", SELECT, computed[0].evar.at
         )
     if inner.distinct:
         raise UpdateError(
@@ -349,11 +351,11 @@ def term(value: Any, at: int) -> Said:
     text = value if type(value).__name__ == "Literal" else getattr(value, "string", None)
     if text is None:
         raise UpdateError(
-            "something without a name stands where an individual belongs", "name an individual, or use a variable", at
+            "a node without a name is in the place of an individual", "name an individual, or use a variable", at
         )
     remedy = f"write {text} without quotation marks" if str(text) in ("true", "false") else ""
     raise UpdateError(
-        f"the text '{text}' stands where an individual belongs", remedy or "name an individual, or use a variable", at
+        f"the text '{text}' is in the place of an individual", remedy or "name an individual, or use a variable", at
     )
 
 

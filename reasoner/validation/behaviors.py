@@ -51,8 +51,9 @@ def undetermined_variables(case: Case) -> Iterator[Fault]:
             yield (
                 node,
                 f"nothing determines the variable {variable[1:]} of {name}",
-                "a variable gets its individual from the situation: from a value condition that isn't negated",
-                f"add a value condition whose value is {variable[1:]}, make it a parameter, or bind it by a witness",
+                "a variable gets its individual from a value condition that isn't negated",
+                f"add a value condition with the value {variable[1:]}, make {variable[1:]} a parameter, or make it the "
+                "variable of an existential condition (c:Witness)",
             )
 
 
@@ -98,9 +99,12 @@ def other_kinds_in_when(case: Case) -> Iterator[Fault]:
                 if problem.members(kind) & {*effect.arguments}:
                     yield (
                         case.reading.names.iri(name),
-                        f"an effect of {name} on {effect.situation} of a whole class has a condition on all of {kind}",
-                        f"in c:when only the effect's own class means the same individual; {kind} means all of its individuals",
-                        f"name the effect's class in the condition, and add a class condition for {kind}",
+                        f"{name} changes {effect.situation} of all individuals of a class, under a condition on all "
+                        f"individuals of {kind}",
+                        "in c:when, the effect's class denotes the changed individual, but another class denotes all of its "
+                        "individuals",
+                        "if the condition is about the changed individual, name the effect's class in the condition, and "
+                        f"add a class condition on {kind}",
                     )
 
 
@@ -152,7 +156,7 @@ def unreachable_behaviors(case: Case) -> Iterator[Fault]:
         more = f"; so neither can {some([*others, *later])}" if others or later else ""
         yield (
             names.iri(first),
-            f"{first} is never applicable: no behaviour leads to {'; '.join(conditions)}{more}",
+            f"{first} is never applicable: no behaviour achieves {'; '.join(conditions)}{more}",
             why,
             mend,
         )
@@ -161,7 +165,7 @@ def unreachable_behaviors(case: Case) -> Iterator[Fault]:
             continue  # the finding on the behaviour reports the value
         yield (
             names.iri(symbol.arguments[0]),
-            f"the goal {symbol} = {value} can't be reached: no behaviour leads to it",
+            f"the goal {symbol} = {value} can't be achieved: no behaviour gives this value",
             "neither the initial situation nor any behaviour gives that value",
             "add a behaviour with that effect, or drop the goal",
         )
@@ -257,10 +261,11 @@ def gaps_of_values(case: Case) -> Iterator[Fault]:
                 said = f"a {kind}" if kind else effect.value
                 yield (
                     names.iri(behavior.name),
-                    f"{behavior.name} on level {behavior.level} gives {effect.situation} {said}, "
-                    f"and no behaviour of level {level} gives that",
-                    "a refinement has to reach the same situation with behaviours of the next level; here it can't",
-                    f"add a behaviour on level {level} with that effect, or widen the class of a parameter of one that has another",
+                    f"{behavior.name} on level {behavior.level} gives {effect.situation} {said} as its value, "
+                    f"but no behaviour of level {level} does so",
+                    "a refinement has to reach the same value with behaviours of the next level, so the behaviour can't be refined",
+                    f"add a behaviour of level {level} with that effect, or let a parameter of a behaviour with such an "
+                    "effect have a wider class",
                 )
 
 
@@ -290,9 +295,10 @@ def crowded_places(case: Case) -> Iterator[Fault]:
                 some = ", ".join(several[:5]) + (", …" if len(several) > 5 else "")
                 yield (
                     names.iri(several[1]),
-                    f"the initial {situation} of {some} is {value}, but behaviours that give it require that no {kind} has it",
+                    f"the initial {situation} of {some} is {value}, but behaviours that give this value require that no "
+                    f"{kind} has it yet",
                     "no behaviour leads to such a situation, so it is probably unintended",
-                    f"state another {situation} of all but one, or let the behaviours take several {kind} there",
+                    f"state another {situation} for all but one of them, or remove that precondition",
                 )
 
 

@@ -49,7 +49,7 @@ def contradictions(case: Case) -> Iterator[Fault]:
             one, other = clash
             yield (
                 names.iri(name),
-                f"{name} requires{where} that {_plain(one)} and that {_plain(other)}",
+                f"{name} requires{where} both {_plain(one)} and {_plain(other)}",
                 f"no state satisfies both, so {'the effect never happens' if where else consequence}",
                 "remove one of the two conditions, or correct its terms",
             )
@@ -209,10 +209,11 @@ def repeated_names(case: Case) -> Iterator[Fault]:
                 yield (
                     names.iri(name),
                     f"a negated condition of {name} requires that {term} is of the class {one.kind}, "
-                    f"{'which it is anyway' if anyway else f'which no {outer} is'}",
-                    f"{term} denotes the same {outer} inside and outside; the condition is about it",
-                    f"if another {one.kind} is meant inside, give it another name than {term}; if {term} itself is meant, remove "
-                    "its class there",
+                    f"{'which always holds' if anyway else f'but no {outer} is'}",
+                    f"{term} denotes the same {outer} inside and outside of the negated condition",
+                    f"if the negated condition is about another {one.kind}, give that another name than {term}; if it is "
+                    f"about {term} itself, "
+                    "remove the class from the condition",
                 )
 
 
@@ -253,5 +254,5 @@ def impossible_situations(case: Case) -> Iterator[Fault]:
                 names.iri(fault.symbol.arguments[0]),
                 f"the goals can't hold together: {fault.what}",
                 fault.why,
-                "want another value of one of them",
+                "require another value in one of the goals",
             )

@@ -58,7 +58,7 @@ def definitions_without_effect(case: Case) -> Iterator[Fault]:
         elif named in of and predicate == OWL + "propertyChainAxiom":
             said, prop = f"{local_name(named)} is a chain", named
         elif other in of and predicate == RDFS + "subPropertyOf" and named != other:
-            said, prop = f"{local_name(named)} is below {local_name(other)}", other
+            said, prop = f"{local_name(named)} is a subproperty of {local_name(other)}", other
         elif named in of and other in of and predicate == OWL + "inverseOf":
             said, prop = f"{local_name(named)} is the inverse of {local_name(other)}", named
             if names.short(of[other]) in rules:
@@ -159,11 +159,13 @@ def conclusions_outside_class(case: Case) -> Iterator[Fault]:
                     said = ", ".join(p.name.removeprefix("?") for p in rule.parameters)
                     yield (
                         names.iri(name),
-                        f"a rule concludes {name}({said}), where {parameter.name.removeprefix('?')} has to be a "
-                        f"{wanted.replace('|', ' or ')}; its conditions make it a {of.replace('|', ' or ')}, and nothing is both",
+                        f"a rule concludes {name}({said}), but its conditions require that "
+                        f"{parameter.name.removeprefix('?')} is of the "
+                        f"class {of.replace('|', ' or ')}, and {name} needs an individual of {wanted.replace('|', ' or ')} there",
                         "the rule never concludes anything",
-                        "correct the rule: the arguments of its conclusion may have changed places, or a class or property in its "
-                        f"conditions may be another; or say that a {of.split('|')[0]} has {name}, too",
+                        "correct the order of the arguments in the conclusion, or a class or property in the conditions; or "
+                        "state that "
+                        f"the class {of.split('|')[0]} has {name}, too",
                     )
 
 

@@ -88,16 +88,17 @@ class _Exclusive:
                 for other, does in self.breaking(ways[0], behaviors):
                     yield (
                         other,
-                        f"{other.name} {does} while a {self.kind} may have that as its {self.situation}; "
-                        f"{behavior.name} then gives it to a second {self.kind}",
-                        f"let {other.name} name the {self.kind} that has it in a value condition, and change its {self.situation}",
+                        f"{other.name} {does} while a {self.kind} may have the same {self.situation}; "
+                        f"{behavior.name} then gives this value to a second {self.kind}",
+                        f"add a value condition to {other.name} that names the {self.kind} with this value, and an effect "
+                        f"that changes its {self.situation}",
                     )
                 continue
             value = effect.value.lstrip("?")
             yield (
                 behavior,
                 f"after {behavior.name}, two individuals of {self.kind} can have the same {self.situation} ({value})",
-                f"add a precondition that no {self.kind} has it before: a c:AbsenceCondition with c:ofClass {self.kind}, "
+                f"add the precondition that no {self.kind} has this value: a c:AbsenceCondition with c:ofClass {self.kind}, "
                 f"c:situationType {self.situation} and c:value {value}",
             )
 

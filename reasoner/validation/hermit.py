@@ -217,7 +217,7 @@ def faults(graph: KnowledgeGraph) -> Iterator[tuple[str, str, str, str, str]]:
             yield (
                 "empty-class",
                 iri,
-                f"{local_name(iri)} can have no individual",
+                f"the class {local_name(iri)} can't have individuals",
                 "its definition contradicts the rest of the ontology",
                 "correct the definition (Protégé: Reasoner, then '?' beside Nothing)",
             )
@@ -227,9 +227,9 @@ def faults(graph: KnowledgeGraph) -> Iterator[tuple[str, str, str, str, str]]:
             yield (
                 "unsatisfiable-precondition",
                 reading.names.iri(behavior.name),
-                f"no individual can be the {' or '.join(terms)} of {behavior.name}",
-                "its preconditions on that term contradict the ontology, so that it is never applicable",
-                "look at the term's type and its conditions for classes that are disjoint or values that aren't in the range",
+                f"no individual can be the {' or the '.join(terms)} of {behavior.name}",
+                "the preconditions on that term contradict the ontology, so that the behaviour is never applicable",
+                "look for disjoint classes and for values outside the range, in the term's type and in its conditions",
             )
 
 

@@ -50,27 +50,25 @@ def unlike_units(case: Case) -> Iterator[Fault]:
             case Fraction():
                 return "", ""
 
-    causes: dict[tuple[str, str], dict[str, str]] = defaultdict(
-        dict
-    )  # by mismatch: the behaviours and their operations
+    causes: dict[tuple[str, str], dict[str, str]] = defaultdict(dict)  # by mismatch: the behaviours and their units
     totals = {name: one.behavior for name, one in reading.problem.domain.aggregates.items()}
     for name, behavior in (*totals.items(), *reading.problem.domain.behaviors.items()):
-        for left, right, does in _together(behavior):
+        for left, right, _ in _together(behavior):
             (one, wrong), (other, also) = unit(left), unit(right)
             if both := wrong or also or (f"{one} and {other}" if one and other and one != other else ""):
                 parts = [part for side in (left, right) for part in inside(side)]
                 about = {part.situation for part in parts if isinstance(part, Amount)}
                 about |= {part.relation for part in parts if isinstance(part, Measure)}
                 cause = " and ".join(sorted(both.split(" and "))), " and ".join(sorted(about))
-                causes[cause].setdefault(name, f"{does} {both}")
+                causes[cause].setdefault(name, both)
     for (_, named), done in causes.items():
         first, *others = done
-        more = f"; so {'do' if len(others) > 1 else 'does'} {some(others)}" if others else ""
+        more = f"; {some(others)} {'have' if len(others) > 1 else 'has'} the same fault" if others else ""
         yield (
             reading.names.iri(first),
-            f"{first} {done[first]} ({named}){more}".replace(f"{first} increases", f"{first} adds up", first in totals),
+            f"{first} combines numbers in {done[first]} ({named}){more}",
             "numbers of different units can't be combined",
-            "name amounts of one unit, correct a c:unit, or multiply by a number that leads from one unit to the other",
+            "use amounts of one unit, correct a c:unit, or multiply by a factor that converts one unit to the other",
         )
 
 
@@ -105,9 +103,9 @@ def multiplied_amounts(case: Case) -> Iterator[Fault]:
             does = f"multiplies {first} by {second}" if sign == "*" else f"divides by {second}"
             yield (
                 names.iri(name),
-                f"{name} {does}, {'both of which' if first and sign == '*' else 'which'} behaviors change",
-                "a level with such a calculation can't be grounded: hard tasks are given up, and no plan is proved optimal",
-                "multiply by a relation's number or a constant, which never changes, or add and subtract instead",
+                f"{name} {does}, {'both of which' if first and sign == '*' else 'which'} behaviours change",
+                "a level with such a calculation can't be grounded: the planner gives up hard tasks, and proves no plan optimal",
+                "multiply by a constant or by the number of a relation, or add and subtract instead",
             )
 
 
@@ -134,9 +132,9 @@ def numbers_missing(case: Case) -> Iterator[Fault]:
         has = "have" if len(who) > 1 else "has"
         yield (
             names.iri(who[0]),
-            f"{some} {has} no {relation}, which {readers} need{'' if ' and ' in readers else 's'} of every {kind}",
-            "a comparison with a missing number is false, so no such behaviour is applicable to it",
-            f"state {relation} of {some}, or give it to another class than {kind}",
+            f"{some} {has} no {relation}, but {readers} read{'' if ' and ' in readers else 's'} {relation} of every {kind}",
+            "a comparison with a missing number is false, so no such behaviour is applicable to these individuals",
+            f"state {relation} of {some}, or let {readers} be about another class than {kind}",
         )
 
 
@@ -295,7 +293,7 @@ class _Ranges:
                 if low == -inf
                 else f"{situation} is always from {_written(low)} to {_written(high)}"
             )
-        return " and ".join(said) or "that is never so"
+        return " and ".join(said) or "no state satisfies this"
 
     def after(self, effect: AmountEffect, narrowed: Mapping[Expression, Range]) -> Range | None:
         """Return the range of an amount after an effect; return None if the range is unknown."""

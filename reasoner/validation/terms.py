@@ -45,7 +45,7 @@ def undeclared_terms(case: Case) -> Iterator[Fault]:
             subject.value if isinstance(subject, ox.NamedNode) else iri,
             f"{name} is used as {wanted}, but isn't declared as one{hint}",
             "an unknown name is read as a new one without a warning, and the intended statement is lost",
-            f"import <{home}>: no file does"
+            f"import <{home}>, which no file imports"
             if home in shipped and home not in case.types
             else f"correct the name, or declare <{iri}>{' a swrl:Variable' if wanted is OF_A_RULE else ''}",
         )
@@ -58,7 +58,7 @@ def relative_iris(case: Case) -> Iterator[Fault]:
         yield (
             node,
             f"{name} is written as a relative IRI",
-            f"it is read as <{node}>, which is another name as soon as the file lies elsewhere",
+            f"it is read as <{node}>, and the name changes when the file is moved",
             f"write it with a prefix, like :{name}, or write the whole IRI",
         )
 
@@ -130,8 +130,8 @@ def individuals_not_different(case: Case) -> Iterator[Fault]:
         names = ", ".join(local_name(iri) for iri in missing[:5]) + (", …" if len(missing) > 5 else "")
         yield (
             missing[0] if missing else min(individuals),
-            f"nothing says that {names} and the other individuals of {local_name(kind)} are different",
-            "OWL lets two names mean one individual: a reasoner would merge them where a functional property clashes",
+            f"no statement says that {names} and the other individuals of {local_name(kind)} are different",
+            "in OWL, two names can denote one individual: a reasoner would merge two values of a functional property",
             "list all of them in one owl:AllDifferent (Protégé: Edit, Make all individuals different)",
         )
 
@@ -162,9 +162,9 @@ def files_and_iris(case: Case) -> Iterator[Fault]:
         if file.stem != wanted:
             yield (
                 iri,
-                f"the file is called {file.name}, its ontology {wanted}",
+                f"the file is called {file.name}, but its ontology is called {wanted}",
                 "imports are found by file name, unless a catalog maps them",
-                f"call the file {wanted}{file.suffix}, or the ontology …/{file.stem}",
+                f"rename the file to {wanted}{file.suffix}, or the ontology to …/{file.stem}",
             )
         for catalog in {file.with_name(ontology.CATALOG), ontology.ROOT / ontology.CATALOG}:
             if catalog not in read:
@@ -172,7 +172,7 @@ def files_and_iris(case: Case) -> Iterator[Fault]:
             if (entry := read[catalog].get(iri)) and not _same(entry, file):
                 yield (
                     iri,
-                    f"{catalog} says that <{iri}> lies in {entry}, not here",
+                    f"according to {catalog}, <{iri}> is in {entry}, not in this file",
                     "Protégé would open the other file",
                     "correct the entry of the catalog",
                 )

@@ -33,7 +33,7 @@ def windows_too_short(case: Case) -> Iterator[Fault]:
                     names.iri(individual),
                     f"{individual} is available for {float(longest):g} s at most; {behavior.name} takes {float(lasts):g} s",
                     f"no plan contains {behavior.name} with {individual}",
-                    "make a c:Window of it longer, or the c:duration shorter",
+                    f"make a c:Window of {individual} longer, or the c:duration of {behavior.name} shorter",
                 )
 
 
@@ -61,7 +61,7 @@ def durations_in_other_units(case: Case) -> Iterator[Fault]:
                 reading.names.iri(name),
                 f"the duration of {name} is calculated in {unit}",
                 "durations are read as seconds",
-                "multiply by a number that leads from this unit to seconds, or correct a c:unit",
+                f"multiply by a factor that converts {unit} to seconds, or correct a c:unit",
             )
 
 

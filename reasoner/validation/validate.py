@@ -210,7 +210,7 @@ def _merged(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
     try:
         infer(graph)
     except KnowledgeError as error:
-        why = "facts about one would be concluded about the other"
+        why = "a reasoner would conclude that facts about one individual hold for the other"
         yield places.finding("merged-individuals", graph.scene, str(error), why, "drop one of the facts")
 
 

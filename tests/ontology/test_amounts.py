@@ -33,7 +33,7 @@ def canteen(tmp_path: Path) -> Callable[[str, str], Path]:
         ("d:battery 6.0", "d:battery 26.0", "<trolley, BATTERY> is 26; it has to be at least 0 and at most 20"),
         (':battery ; c:fromLevel 2 ; c:unit "Wh"', ':battery ; c:fromLevel 2 ; c:unit "min"', "min and Wh ("),
         (':BATTERY ; c:sign "<"', ':TROLLEY_AT ; c:sign "<"', "TROLLEY_AT is no amount, so that no number compares with it"),
-        ('c:change "assign"', 'c:change "set"', "has no change, two, or an invalid one"),
+        ('c:change "assign"', 'c:change "set"', "has no kind of change, several kinds, or an invalid kind"),
         ('c:sign "<" ; c:amount 20.0', 'c:sign "<"', "L2_CHARGE.notFull> has neither c:amount nor c:right"),
         ("owl:NamedIndividual, c:SituationType, c:Amount", "owl:NamedIndividual, c:SituationType", "isn't declared as an amount"),
     ],

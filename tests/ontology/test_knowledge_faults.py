@@ -35,13 +35,13 @@ FEE = """
     ("old", "new", "file", "node", "what", "remedy"),
     [
         ("# What follows.", CIRCLE, "theatre", "A.rule",
-         "A is defined by B not being true, which is defined by A in turn", "take one of these conditions out of its rule"),
+         "A follows if B is false, and B depends on A", "remove one of these conditions from its rule"),
         (":PUSH.cart ; c:situationType :PARKED ; c:value :PUSH.room ; rdfs", ":PUSH.cart ; c:situationType :FULL ; rdfs",
          "theatre", "PUSH.there", "changes FULL, which is defined by the class FullCart", "remove the effect"),
         ("# What follows.", FREE, "theatre", "Stowed",
          "the SWRL rule 'all stowed': the variable ?prop of its head is in no atom of its body", "say there what it is"),
         ('c:change "decrease" ; c:amount 0.5 ;', 'c:change "decrease" ; c:right :fee1 ;' , "theatre", "SWITCH",
-         "SWITCH decreases h and EUR (FEE and HOURS)", "name amounts of one unit"),
+         "SWITCH combines numbers in h and EUR (FEE and HOURS)", "use amounts of one unit"),
         ("d:hours 0.5", "d:hours -0.5", "first-night", "spot2", "<spot2, HOURS> is -0.5; it has to be at least",
          "state such an amount"),
     ],
@@ -118,10 +118,8 @@ def test_an_effect_on_what_axioms_define_is_at_fault_and_not_the_definition(tmp_
     (said,) = theatre_with(tmp_path, insert, f"{insert} . {subject} :near ?prop", more)
     assert said.rule == "effect-on-definition"
     assert "LOAD" in said.what
-    assert "changes NEAR, which is defined by the axiom that carries is below near" in said.what
-    assert said.remedy.startswith(
-        "remove the effect; or, if behaviours are to keep NEAR up to date themselves, drop the axiom"
-    )
+    assert "changes NEAR, which is defined by the axiom that carries is a subproperty of near" in said.what
+    assert said.remedy.startswith("remove the effect; or, if behaviours are to update NEAR themselves, drop the axiom")
 
 
 @pytest.mark.parametrize(
@@ -215,11 +213,12 @@ MINI = """
 @pytest.mark.parametrize(
     ("said", "node", "what"),
     [
-        ({"shut": "'false'", "unit": "kg"}, "CLOSE", "the text 'false' stands where an individual belongs"),
+        ({"shut": "'false'", "unit": "kg"}, "CLOSE", "the text 'false' is in the place of an individual"),
         ({"shut": "~", "unit": "kg"}, "CLOSE", "this is no SPARQL update"),
-        ({"shut": "false", "unit": "litres"}, "SEAL", "SEAL compares kg and litres (FILL and size); so does POUR"),
+        ({"shut": "false", "unit": "litres"}, "SEAL",
+         "SEAL combines numbers in kg and litres (FILL and size); POUR has the same fault"),
         ({"shut": "false . ?box :SHUTT true", "unit": "kg"}, "CLOSE", ":SHUTT is neither a property"),
-        ({"shut": "false . ?box :SHUT true", "unit": "kg"}, "CLOSE", "CLOSE requires that box SHUT false and that box SHUT true"),
+        ({"shut": "false . ?box :SHUT true", "unit": "kg"}, "CLOSE", "CLOSE requires both box SHUT false and box SHUT true"),
     ],
     ids=["a text for a value", "no update", "units", "a misspelt name", "conditions that contradict each other"],
 )  # fmt: skip

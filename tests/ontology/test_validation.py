@@ -104,9 +104,9 @@ def test_a_term_can_stand_for_what_its_class_shares_with_the_class_that_is_wante
 @pytest.mark.parametrize(
     ("title", "node", "remedy"),
     [
-        ("true as a text where the individual is wanted", "task.clean", "write c:true"),
-        ("a text where an individual is wanted", "plate2", "name an individual"),
-        ("an amount of at least more than at most", "WEIGHT", "correct c:leastAmount or c:mostAmount"),
+        ('the text "true" in place of the individual c:true', "task.clean", "write c:true"),
+        ("a text as the value of an object property", "plate2", "name an individual"),
+        ("an amount whose minimum is greater than its maximum", "WEIGHT", "correct c:leastAmount or c:mostAmount"),
     ],
 )
 def test_the_only_remedy_is_said_where_the_fault_is(title: str, node: str, remedy: str, tmp_path: Path) -> None:
@@ -180,7 +180,7 @@ def test_a_term_of_a_shipped_ontology_that_no_file_imports_names_the_import(tmp_
     text = domain.read_text(encoding="utf-8")
     domain.write_text(text.replace("  owl:imports <https://w3id.org/confab/core> ;\n", ""), encoding="utf-8")
     told = {finding.remedy for finding in validate([scene]) if finding.what.startswith("Task is used as a class")}
-    assert told == {"import <https://w3id.org/confab/core>: no file does"}
+    assert told == {"import <https://w3id.org/confab/core>, which no file imports"}
 
 
 def test_findings_come_as_json_with_exit_code_1(tmp_path: Path) -> None:
@@ -230,7 +230,7 @@ def test_what_is_concluded_from_a_wrong_pair_does_not_hide_it(tmp_path: Path) ->
     domain = tmp_path / "washing.ttl"
     domain.write_text(domain.read_text(encoding="utf-8") + near, encoding="utf-8")
     said = {finding.what for finding in validate([scene]) if finding.rule == "pair-outside-class"}
-    assert "basin states near with plate9, but plate9 is no Place, the range of near" in said
+    assert "the scene states basin near plate9, but plate9 isn't of the class Place (the range of near)" in said
 
 
 def test_a_number_that_a_behaviour_reads_of_a_smaller_class_may_be_lacking_elsewhere(tmp_path: Path) -> None:

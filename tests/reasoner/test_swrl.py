@@ -174,7 +174,7 @@ def test_a_class_that_is_defined_by_itself_is_followed_step_by_step(yard: Yard) 
         (
             KEPT.format(held="Kept", inner="Other", other="[ a owl:Class ; owl:complementOf :Kept ]")
             + ":OTHER a owl:NamedIndividual, c:SituationType ; c:holdsOf :Other . :Thing c:hasSituationType :OTHER .",
-            "KEPT is defined by OTHER not being true|OTHER is defined by KEPT not being true",
+            "KEPT follows if OTHER is false|OTHER follows if KEPT is false",
         ),
     ],
 )  # fmt: skip
