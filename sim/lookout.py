@@ -105,7 +105,7 @@ class Lookout:
             max(2 * h.hand.opening for h in world.hands.values()),
         )
         wide = f"{width * 100:.0f} cm wide; hands open to {widest * 100:.0f} cm"
-        text = f"{name}, of which no fact speaks, is {width * 100:.0f} cm wide"
+        text = f"{name}, which isn't in the scene, is {width * 100:.0f} cm wide"
         found = Discovery(name, tuple(sorted(kinds)), fixed=wide if width >= widest else "", text=text)
         for place in (place for place in world.embodiment.places if self._is_at(name, place)):
             symbols = (Symbol(s.name, (name,)) for s in wheres if uses[s.name].perceiver == "perceive_place")

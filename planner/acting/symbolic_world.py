@@ -89,7 +89,7 @@ class SymbolicWorld:
         if intervention.change in (InterventionKind.ADD, InterventionKind.BOX):
             self.problem = with_individual(self.problem, intervention.individual, intervention.kind)
         if intervention.change is InterventionKind.BOX:
-            text = f"{intervention.individual}, of which no fact speaks, is there"
+            text = f"{intervention.individual}, which isn't in the scene, is there"
             self._news.append(Discovery(intervention.individual, (intervention.kind,), text=text))
         if intervention.change is InterventionKind.PUSH:
             self._add_spot(intervention.individual)
