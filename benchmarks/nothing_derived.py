@@ -69,7 +69,7 @@ def call(path: Path) -> tuple[float, int]:
 def main() -> None:
     """Print the table."""
     pairs = int(os.environ.get("CONFAB_PAIRS", "10"))
-    print("| family | n | primitives | CPU s | without | ratio, median of pairs | of the least of each |")
+    print("| family | n | primitives | CPU s | without that code | ratio, median | ratio of least times |")
     print("|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
         for family, n in CASES:

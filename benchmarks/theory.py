@@ -32,7 +32,7 @@ def main() -> None:
     print("|---" * (EPISODES + 1) + "|")
     for name, values in (
         ("the paper's mode, no memory", curve.without["paper"]),
-        ("the paper's mode, what was learned before", curve.with_memory["paper"]),
+        ("the paper's mode, with the memory of the earlier episodes", curve.with_memory["paper"]),
         ("the default planner, no memory", curve.without["guarded"]),
     ):
         print(f"| {name} | " + " | ".join(str(value) for value in values) + " |")
