@@ -59,9 +59,9 @@ def cases(folder: Path) -> Iterator[Case]:
     (folder / "link.ttl").symlink_to("m.ttl")
     yield "3 learning through a link", "learn living-room --memory link.ttl", (0,)
     yield "3 … the link's target has learned", "memory show m.ttl --most 1", (0,)
-    yield "4 10,000 objects with a second", "generate served --objects 10000 -o large.ttl", (0,)
+    yield "4 10,000 objects with a limit of one second", "generate served --objects 10000 -o large.ttl", (0,)
     yield "4 …", "plan large.ttl --time-limit 1", (3,)
-    yield "5 a text where an individual belongs", "plan " + tea("-scene", "d:isAt :table", 'd:isAt "table"'), (2,)
+    yield "5 a text in place of an individual", "plan " + tea("-scene", "d:isAt :table", 'd:isAt "table"'), (2,)
     for old, new in (("c:index 1", 'c:index "one"'), ("c:level 1", "c:level 1.5"), ("c:level 1", "c:level 0")):
         yield f"5 {new}", f"plan {tea('', old, new)}", (2,)
     for cost in ('"x"', "-1", '"NaN"^^<http://www.w3.org/2001/XMLSchema#double>'):
@@ -80,18 +80,18 @@ def cases(folder: Path) -> Iterator[Case]:
             part.write_text(re.sub(r"(?<!\w)d?:Place\b", f"<https://example.org/tearoom#{name}>", part.read_text()))
         yield f"5 a class called {name}", f"plan {place.name}/tearoom-scene.ttl", (0,)
     for name, text in (("5", '{"steps": 5}'), ("deep", "[" * 100_000), ("long", f'{{"steps": [{"9" * 5000}]}}')):
-        yield f"5 a plan that is none ({name})", f"execute living-room --plan {file(f'{name}.json', text)}", (2,)
+        yield f"5 an invalid plan ({name})", f"execute living-room --plan {file(f'{name}.json', text)}", (2,)
     yield "5 a name with a blank", "execute living-room --save ep_1.ttl", (0,)
-    yield "5 an address that is none", "plan http://[bad", (2,)
+    yield "5 an invalid address", "plan http://[bad", (2,)
     braces = "{" * 3000 + "}" * 3000
     yield "6 3,000 nested braces", f"query living-room SELECT_*_WHERE_{braces}", (2,)
     yield "6 an unbounded cross product", "query living-room SELECT_*_WHERE_{?a_?b_?c_._?d_?e_?f_._?g_?h_?i}", (3,)
     yield "6 SERVICE", "query living-room SELECT_*_WHERE_{SERVICE_<http://127.0.0.1:9/>_{?a_?b_?c}}", (2,)
     same = tea("-scene", "d:isAt :table", "owl:sameAs :table ; d:isAt :table")
-    yield "7 two things said to be the same", f"validate {same}", (1,)
+    yield "7 two objects related by owl:sameAs", f"validate {same}", (1,)
     counts = (folder / "m.ttl").read_text().replace(":episodes ", ":episodes -")
     yield "7 a negative count", f"memory show {file('negative.ttl', counts)}", (2,)
-    yield "8 a control character is asked for", "plan \x1b[2J", (2,)
+    yield "8 a scene name with a control character", "plan \x1b[2J", (2,)
 
 
 def main() -> int:

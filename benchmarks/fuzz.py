@@ -385,7 +385,7 @@ def fuzz(cases: int, doors: Sequence[str]) -> int:
 
 def table() -> None:
     """Print the number of cases and faults of each door, and the number of corrected causes."""
-    print("| door | cases tried | broke | causes corrected | open |\n|---|---|---|---|---|")
+    print("| input | cases tried | wrong answers | causes corrected | causes open |\n|---|---|---|---|---|")
     cases, counts = list(known()), tried()
     for door, (run, _) in DOORS.items():
         causes = [cause for d, _, cause in cases if d == door]

@@ -214,7 +214,7 @@ def bad_memories() -> dict[str, Memory]:
     other = [replace(rule, does=(f"OTHER_{rule.does[0]}", rule.does[1])) for rule in rules]
     found = {"trained": good}
     for name, those in (
-        ("promises reversed", turned),
+        ("goal and condition exchanged", turned),
         ("half the conditions", careless),
         ("arguments swapped", swapped),
         ("of another domain", other),

@@ -71,7 +71,10 @@ def kills(many: int, into: Path, chosen: Sequence[str] = ()) -> None:
     known: dict[str, Record] = json.loads(record.read_text("utf-8")) if record.is_file() else {}
     worlds = {seed: drawn(seed, constrained=CONSTRAINED) for seed in range(FIRST, FIRST + WORLDS)}
     judging = hashed("".join(file.read_text("utf-8") for file in sorted((ROOT / "worlds").glob("*.py"))))
-    print("| part | module | faults tried | noticed | in no world | share of the others |\n|---|---|---|---|---|---|")
+    print(
+        "| part | module | faults tried | detected | without effect in these worlds | detected, share of the others |\n"
+        "|---|---|---|---|---|---|"
+    )
     for part, files in PARTS.items():
         if chosen and part not in chosen:
             continue

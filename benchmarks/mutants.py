@@ -193,7 +193,7 @@ def try_out(file: str, many: int, again: bool) -> None:
 def table() -> None:
     """Print the share of detected faults of each module, and the lines with survivors."""
     print(
-        "| module | faults tried | the same in effect | noticed of the others | | survived |\n|---|---|---|---|---|---|"
+        "| module | faults tried | without observable effect | detected of the others | | not detected |\n|---|---|---|---|---|---|"
     )
     known = {file: its for file, its in records().items() if file in TESTS}
     for file, its in known.items():
@@ -202,7 +202,7 @@ def table() -> None:
         stale = "" if its == record(file, (ROOT / file).read_text("utf-8")) else " (as it was)"
         row = f"{others + len(its['same'])} | {len(its['same'])} | {len(its['noticed'])} | {share:.0%} | {len(its['survived'])}"
         print(f"| `{file}`{stale} | {row} |")
-    print("\nLines with a fault that survived:\n\n```text")
+    print("\nLines with a fault that the tests didn't detect:\n\n```text")
     for file, its in known.items():
         for line in its["survived"].values():
             print(f"{file}: {' '.join(line.split())[:140]}")

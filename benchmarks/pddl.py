@@ -215,9 +215,9 @@ def coverage(found: Sequence[tuple[str, Path, Path]], commands: dict[str, list[s
     rejected = [f"{problem}: {name}" for (name, problem), done in runs.items() if done.accepted is False]
     folders = list(dict.fromkeys(place for place, _, _ in found))
     print(
-        "Solved, CPU seconds over the problems that the planner solved, geometric mean of plan length over lama-first's where"
+        "Number of solved problems; CPU seconds for these; geometric mean of the ratio of plan lengths to lama-first, over the"
     )
-    print("both solve; of ours, how many plans unified-planning's sequential plan validator accepts.\n")
+    print("problems that both solve; for Confab the number of plans that unified-planning's plan validator accepts.\n")
     print("| problems |", " | ".join(commands), "|")
     print("|---" * (len(commands) + 1) + "|")
     for folder in [*folders, "all"]:
@@ -230,7 +230,7 @@ def coverage(found: Sequence[tuple[str, Path, Path]], commands: dict[str, list[s
             valid = f", {sum(judged)} accepted" if judged else ""
             cells.append(f"{len(solved)} ({seconds:.1f} s{_ratio(runs, name, here)}{valid})")
         print(f"| {folder}: {len(here)} | {' | '.join(cells)} |", flush=True)
-    print(f"\nPlans of ours that unified-planning's validator rejects: {len(rejected)}", *rejected, sep="\n")
+    print(f"\nPlans of Confab that unified-planning's validator rejects: {len(rejected)}", *rejected, sep="\n")
     for name in commands:
         missing = [str(p.relative_to(p.parents[2])) for _, _, p in found if runs[name, p].plan is None]
         print(f"Not solved by {name}:", ", ".join(missing) or "none")

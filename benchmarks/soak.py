@@ -80,7 +80,9 @@ def soak(episode: Callable[[Path], None], many: int) -> str:
 def main() -> None:
     """Print the table."""
     counts = [int(word) for word in sys.argv[1:3]] or [1000, 100]
-    print("| episode | many | memory | CPU time of one | open files | PyBullet clients |\n|---|---|---|---|---|---|")
+    print(
+        "| episode | number | memory | CPU time of one episode | open files | PyBullet clients |\n|---|---|---|---|---|---|"
+    )
     for episode, many in zip((symbolic, physics), counts, strict=False):
         if many:
             print(soak(episode, many), flush=True)

@@ -88,7 +88,7 @@ class Sayings:
         said = sorted(rule.asks, key=lambda c: isinstance(c, Witness | RelationCondition))
         asks = [self.condition(c) for c in said]
         left = len(asks) - MOST_SAID
-        more = f" and {left} thing{'s' * (left > 1)} more" if left > 0 else ""
+        more = f" and {left} more condition{'s' * (left > 1)}" if left > 0 else ""
         when = f", when {', '.join(asks[:MOST_SAID])}{more}" if asks else ""
         return f"so that {self.goal(rule)}{when}: {self.step(*rule.does)}"
 
