@@ -54,7 +54,7 @@ def reach(embodiment: Embodiment) -> Reach:
     Raises
     ------
     ValueError
-        No behaviour uses the skill `reach`, which states the settings.
+        The settings are missing, since no behaviour uses the skill `reach`.
     """
     numbers, heights = _settings(embodiment)
     points, solids = _positions(embodiment)

@@ -175,7 +175,7 @@ def _durations(
     members: Sequence[int],
     names: Mapping[str, str],
 ) -> dict[int, int] | None:
-    """Return the durations of activities with other actors, or None if static facts don't allow these actors."""
+    """Return the durations of activities after an exchange of their actors, or None if static facts don't allow the exchange."""
     found = {}
     for member in members:
         step = order.activities[member].step
