@@ -35,7 +35,7 @@ symbols to values.
 
 
 class Stated(list[str]):
-    """An immutable list of facts as texts. An index like ``facts["cup1 LOCATION"]`` returns the value of a symbol."""
+    """An immutable list of facts as texts. An index like ``facts["cup1 LOCATION"]`` selects the value of a symbol."""
 
     @overload
     def __getitem__(self, index: SupportsIndex | str) -> str: ...
@@ -62,7 +62,7 @@ class Stated(list[str]):
         return self
 
     def __reduce__(self) -> tuple[type[Stated], tuple[list[str]]]:
-        """Return the reduced form for copying and pickling."""
+        """Return the form in which the object is copied and pickled."""
         return type(self), ([*self],)
 
     if not TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""An MCP server on stdio. Its tools plan, replan, query, validate, explain and verify for agents that use a language model.
+"""An MCP server on stdio, with tools that plan, replan, query, validate, explain and verify for language-model agents.
 
 Each call runs in a separate process. The process ends when the call or the server ends, at the time limit, or when the client
 cancels the call. An answer is text of at most `SHOWN` bytes. If an answer was cut, its last line names a resource that has the
@@ -61,7 +61,7 @@ class Kept:
         return text.encode()[: SHOWN - len(last.encode())].decode(errors="ignore") + last
 
     def whole(self, number: str) -> str:
-        """Return the complete text of the answer with a number.
+        """Return the complete text of the answer that has the number `number`.
 
         Raises
         ------

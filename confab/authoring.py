@@ -85,7 +85,7 @@ def new_domain(name: str, folder: str | Path | None = None, bodies: bool = False
 def validate(*files: str | Path, deep: bool = False) -> Table:
     """Return a table of the findings in ontology files and their imports, with a remedy for each finding.
 
-    `deep` also runs HermiT, which needs Java.
+    With `deep`, HermiT runs, too, which needs Java.
 
     Raises
     ------

@@ -132,7 +132,7 @@ def app() -> None:
 def main(arguments: Sequence[str] | None = None, ending: Ending | None = None) -> NoReturn:
     """Run the command line, and end the process with an exit code and at most one line on stderr.
 
-    If a step continues long after its deadline, `ending` is called to end the process. Another program can call `main` without
-    `ending`; then no deadline ends the process.
+    If a step continues long after its deadline, `ending` is called to end the process. If another program calls `main` without
+    `ending`, no deadline ends the process.
     """
     run_to_end(lambda: app(arguments, prog_name="confab", standalone_mode=False, obj=ending))

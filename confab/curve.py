@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 KINDS = (".png", ".svg", ".pdf")
 MODES: dict[Mode, str] = {"guarded": "by default", "paper": "the paper's mode"}
 SECONDS = 20.0
-"""Time limit of a planning call in seconds. If a call exceeds the limit, the picture lacks its data point."""
+"""Time limit of a planning call in seconds. The picture lacks the data points of planning calls that exceed the limit."""
 MANY = 12
 """Maximum number of episodes for which the picture shows names and counts."""
 

@@ -202,7 +202,10 @@ def answer(domain: str, problem: str, engine: str | None, deadline: Deadline) ->
 
 
 def solved(domain: str, problem: str, engine: str | None, seconds: float | None) -> Answer:
-    """Return the answer of unified-planning to a PDDL problem. `confab.reasoner.workers.call` runs this function in a process."""
+    """Return the answer of unified-planning to a PDDL problem.
+
+    `confab.reasoner.workers.call` runs this function in a separate process.
+    """
     from unified_planning import environment as environments
     from unified_planning.environment import Environment
     from unified_planning.exceptions import UPException
@@ -250,8 +253,8 @@ def _tell(engine: str, deadline: Deadline) -> None:
 def _directly(planner: Any, domain: str, problem: str, deadline: Deadline) -> tuple[str, list[str]]:
     """Run an engine that reads PDDL on the exported files, and return the engine's status and the steps of the plan.
 
-    The reader of unified-planning takes minutes for large relations and doesn't support derived predicates. The engine therefore
-    gets the files directly.
+    The reader of unified-planning takes minutes for large relations and doesn't support derived predicates. Therefore, the engine
+    reads the exported files directly.
     """
     from unified_planning.model import Problem as Nothing
 

@@ -50,7 +50,9 @@ FORMS = (
 
 
 def parse_interventions(problem: Problem, texts: Iterable[str]) -> list[Intervention]:
-    """Return the interventions in texts. A text may also name a file with one intervention per line (``#`` begins a comment).
+    """Return the interventions that texts describe.
+
+    A text may also name a file with one intervention per line (``#`` begins a comment).
 
     Raises
     ------
@@ -123,14 +125,14 @@ def parse_intervention(problem: Problem, text: str) -> Intervention:
 
 
 def _position(text: str) -> int:
-    """Return the position in a path that a text denotes; raise ValueError if the text isn't a natural number."""
+    """Return a text as the position of a step in a path; raise ValueError if the text isn't a natural number."""
     if not text.isdigit():
         raise ValueError(text)
     return int(text)
 
 
 def _seconds(text: str) -> float:
-    """Return the time in seconds that a text denotes; raise ValueError if the time is negative or infinite."""
+    """Return a text as a time in seconds; raise ValueError if the time is negative or infinite."""
     seconds = float(text)
     if not 0 <= seconds < math.inf:
         raise ValueError(text)
@@ -459,7 +461,7 @@ def carry_out(
 
 
 def _whole_problem(scene: Known, plan: AnyPlan | None, goals: Sequence[str]) -> Problem:
-    """Return the problem of the whole scene. It has the given goals or, if `plan` is a result, the goals of the result.
+    """Return the problem of the whole scene, with the given goals or, if `plan` is a result, with the goals of the result.
 
     The part of the scene from which the first plan was made may not suffice for plans that are made during execution.
     """
@@ -468,7 +470,7 @@ def _whole_problem(scene: Known, plan: AnyPlan | None, goals: Sequence[str]) -> 
 
 
 def planner_of(mode: Mode, memory: Links | None = None) -> Planner | None:
-    """Return the planner that makes new plans during execution in a mode, or None for the default planner.
+    """Return the planner of a mode, which makes new plans during execution; return None for the default planner.
 
     Raises
     ------
@@ -514,8 +516,8 @@ def execute(
     interventions : iterable of str or Intervention
         Texts like ``after=28 cup2 LOCATION location8``, or interventions.
     world : {'symbolic', 'pybullet'}, World, or str
-        The world that executes the task. A text like ``pyrobosim:world.yaml`` names an interface in the scene and the address
-        of a robot.
+        The world in which the task is executed. A text like ``pyrobosim:world.yaml`` names an interface in the scene and the
+        address of a robot.
     planner : callable, optional
         The function that makes a new plan; by default the hierarchical planner.
     seed : int
@@ -526,7 +528,7 @@ def execute(
         A function that is called with the PyBullet world before the execution, for instance to inject a fault.
     retry_policy : RetryPolicy
     caution : Caution, optional
-        What is known from failures in earlier episodes.
+        The knowledge that was learned from failures in earlier episodes.
     perturb : bool
         Vary poses, friction, masses and filled amounts in PyBullet at random, with `seed`.
     noise : float

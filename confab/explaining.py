@@ -45,8 +45,8 @@ class Explanation:
     """An explanation of the preference for the behaviour `chosen` over the behaviour `other`.
 
     Each of the `reasons` has a weight, which is a difference of natural log odds. `lead` is the sum of the weights. `rule` is the
-    learned rule as a sentence, and `behind` tells from which episodes the rule comes. If memory has no advice, `note` is a remark
-    on this.
+    learned rule as a sentence, and `behind` tells from which episodes the rule comes. If the memory has no advice, the text
+    `note` says so.
     """
 
     chosen: str

@@ -26,11 +26,11 @@ ASK {
     UNION { ?property owl:propertyChainAxiom|owl:equivalentProperty|owl:inverseOf ?other }
     UNION { ?atom <http://www.w3.org/2003/11/swrl#propertyPredicate> ?property } }
 }"""
-"""Query that asks whether a scene has definitions. If it has none, it needn't be read as a problem before a query."""
+"""Query that asks whether a scene has definitions. A scene without definitions needn't be read as a problem before a query."""
 
 
 def write_following(graph: KnowledgeGraph, read: Callable[[], Reading], sparql: str) -> None:
-    """Write the initial facts of each derived or remembered situation type in a query into the named graph `DERIVED`."""
+    """Write the initial facts about the derived or remembered situation types in a query into the named graph `DERIVED`."""
     name = ox.NamedNode(BASE + DERIVED)
     graph.store.clear_graph(name)
     if not graph.query(DEFINED, SCENE):

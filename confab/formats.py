@@ -107,9 +107,9 @@ class _Outcome(TypedDict):
 
 
 class OutcomeJson(_Outcome, total=False):
-    """The result of planning. For a solved task, it has the steps and the length of a plan.
+    """The result of planning. For a solved task, the JSON object has the steps and the length of a plan.
 
-    For an unsolved task, it has the reason, and possibly a certificate that the task is unsolvable.
+    For an unsolved task, the object has the reason, and possibly a certificate that the task is unsolvable.
     """
 
     length: dict[str, int]

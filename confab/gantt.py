@@ -23,7 +23,7 @@ def save_gantt(
 ) -> Path:
     """Draw a schedule as a Gantt chart into a picture file, and return the path.
 
-    If given, the serial duration `serial` is shown, too.
+    If `serial` is given, the chart also shows this serial duration.
     """
     from confab.picturing import save, words_as_they_are
 

@@ -1,8 +1,8 @@
 """Suggestions of the right name for a wrong name.
 
-Each kind of object has a table of wrong names (`confab.hints`). First the whole wrong name is looked up in this table, then the
-words of the name. Words that the table doesn't have are compared with the public names and their descriptions. Words with the
-same meaning count as equal. The candidates are first the names of the object itself, then the names of objects in its attributes
+Each kind of object has a table of wrong names (`confab.hints`). First the whole wrong name is looked up in the table, then the
+words of the name. Words that aren't in the table are compared with the public names and their descriptions. Words with the same
+meaning count as equal. The candidates are first the names of the object itself, then the names of objects in its attributes
 (``result.outcome.search``), then all other names (``scene.with_fact``).
 """
 
@@ -233,7 +233,7 @@ def described(kind: str) -> Mapping[str, str]:
 
 
 def places(kind: str) -> Iterator[tuple[str, str, int]]:
-    """Yield each kind of object that is reachable from `kind`, the expression for the object, and the expression's length."""
+    """Yield each kind of object that is reachable from `kind`, with an expression for the object and the expression's length."""
     waiting, seen = [(kind, "confab." if kind == "confab" else "", 0)], {kind}
     while waiting:
         here, before, far = waiting.pop(0)
@@ -264,7 +264,7 @@ TYPED = 0.85
 PART = 0.6
 """Score of a word that a table's entry has only as a part of longer names."""
 OWN = 0.1
-"""Bonus for a word that is itself the name suggested by an entry."""
+"""Bonus for a word that is itself the suggested name of a table's entry."""
 UNKNOWN = 0.4
 """Weight of a word that occurs in no entry of a table."""
 HALF = 0.75

@@ -118,12 +118,12 @@ def listed(those: Sequence[Run]) -> Table:
 
 
 def compared(those: Sequence[Run], one: str, other: str) -> Table:
-    """Return a table of the differences between two runs in figures, first-level steps and final values of goals.
+    """Return a table of the differences between two runs: in figures, in first-level steps, and in final values of goals.
 
     Raises
     ------
     KnowledgeError
-        A run with one of these names doesn't exist.
+        No run has one of the given names.
 
     Examples
     --------
@@ -176,7 +176,7 @@ def history_html(those: Sequence[Run], title: str, names: Sequence[str] = ()) ->
     Raises
     ------
     KnowledgeError
-        A run with one of these names doesn't exist.
+        No run has one of the given names.
     """
     from confab.page.frozen import page_html
 

@@ -78,7 +78,7 @@ def read_plan(path: Path, problem: Problem) -> Plan:
     Raises
     ------
     KnowledgeError
-        The file contains no such JSON, or a step mentions terms that the scene doesn't have. The message states the position.
+        The file isn't the JSON of a plan, or a step mentions terms that the scene doesn't have. The message states the position.
     """
     data = _json(path, "plan")
     status = data.get("status", Status.SOLVED.value) if isinstance(data, dict) else None
@@ -96,7 +96,7 @@ def read_certificate(path: Path) -> Certificate:
     Raises
     ------
     KnowledgeError
-        The file contains no such JSON. The message states the expected form.
+        The file isn't the JSON of a certificate. The message states the expected form.
     """
     data = _json(path, "certificate")
     try:

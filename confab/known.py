@@ -67,12 +67,18 @@ class Known(metaclass=RightNames):
     _told: bool = field(default=False, init=False, repr=False, compare=False)
 
     def __getstate__(self) -> dict[str, object]:
-        """Return the state for pickling and copying. It has no cached values; the copy reads them from the graph again."""
+        """Return the state for pickling and copying.
+
+        The state has no cached values; the copy reads these values from the graph again.
+        """
         self.settle()
         return {"knowledge": self.knowledge, "seconds": self.seconds, "_edited": False, "_told": self._told}
 
     def __getitem__(self, name: object) -> NoReturn:
-        """Raise a `TypeError` whose message names the properties to use. Python also calls this method for iteration and ``in``."""
+        """Raise a `TypeError` whose message names the properties to use.
+
+        Python also calls this method for an iteration over the scene, and for the operator ``in``.
+        """
         raise TypeError("a scene has no items; use objects, facts, goals or behaviors")
 
     @cached_property
@@ -367,7 +373,7 @@ class Known(metaclass=RightNames):
     ) -> rdflib.Graph | int:
         """Return the triples of a CONSTRUCT query.
 
-        If a path is given, write them into a file that imports this scene, and return their number.
+        If a path is given, write the triples into a file that imports this scene, and return the number of triples.
 
         Raises
         ------

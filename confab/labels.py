@@ -155,7 +155,10 @@ WAYS = {*PLACING, "from", "into", "onto", "with", "by", "off", "over", "behind",
 
 
 def _mention(role: str, label: str, terms: Iterable[str]) -> re.Pattern[str] | None:
-    """Return a pattern of the words for a role in a label, or None. For a role named "onto", these are the words after "onto"."""
+    """Return a pattern of the words for a role in a label, or None.
+
+    The words after "onto" in a label denote the role named "onto".
+    """
     name = role.lstrip("?")
     if name.lower() in WAYS:
         others = "|".join(re.escape(term.lstrip("?")) for term in terms)
@@ -199,7 +202,7 @@ def labels_of(knowledge: KnowledgeGraph, names: Names, problem: Problem, others:
     ----------
     knowledge : KnowledgeGraph
     names : Names
-        The IRIs of the names.
+        A mapping between the names and their IRIs.
     problem : Problem
     others : iterable of str
         Further names whose labels are wanted, for instance of furniture, which isn't in the problem.
@@ -218,7 +221,10 @@ def labels_of(knowledge: KnowledgeGraph, names: Names, problem: Problem, others:
 
 
 def _read(knowledge: KnowledgeGraph, iris: Sequence[str]) -> dict[str, str]:
-    """Return the labels of IRIs. English labels are preferred; the second choice are labels without a language."""
+    """Return the labels of IRIs.
+
+    English labels are preferred to labels without a language; these are preferred to labels in other languages.
+    """
     found: dict[str, tuple[int, str]] = {}
     for start in range(0, len(iris), AT_ONCE):
         those = " ".join(f"<{iri}>" for iri in iris[start : start + AT_ONCE])

@@ -32,7 +32,9 @@ ASKED = (
 
 
 class Sayings:
-    """Writer of sentences about learned experience. It uses labels if they are available, and otherwise the ontology's names.
+    """Writer of sentences about learned experience.
+
+    The sentences use labels if labels are available, and otherwise the ontology's names.
 
     Parameters
     ----------

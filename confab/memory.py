@@ -1,4 +1,4 @@
-"""The class `Memory`, which users of Python and the command line load, train, save, merge and show.
+"""The class `Memory`, whose objects users of Python and the command line load, train, save, merge and show.
 
 A memory file has two kinds of experience. Rules with counts guide the default planner (`confab.reasoner.memory.experience`). The
 links between facts and quantified behaviours guide the paper's mode (`confab.reasoner.memory.links`).
@@ -51,7 +51,9 @@ if TYPE_CHECKING:
 
 
 MOST_LINKS = 20_000
-"""Maximum number of the paper's links in a memory. From a plan that would add more links, only the default planner learns."""
+"""Maximum number of the paper's links in a memory. If a plan would add more links, no links are added: only the default planner's
+experience learns from the plan.
+"""
 SHOWN = 3
 """Maximum number of preferences that are listed for a method."""
 
@@ -64,18 +66,19 @@ class Memory(metaclass=RightNames):
     Attributes
     ----------
     links : Links
-        The paper's probabilities p(situated object instance | quantified behaviour). They are read from the file on first access.
+        The paper's probabilities p(situated object instance | quantified behaviour). The probabilities are read from the file on
+        first access.
     names : Names
-        The IRIs of short names.
+        A mapping between short names and IRIs.
     scene : str
         IRI of the scene that the memory file imports.
     experience : Experience
-        Rules, orders of goals and methods, with the numbers of times that each was chosen, passed over and failed.
+        Rules, orders of goals and methods, each with the numbers of times that it was chosen, was passed over, and failed.
     trusted : set of replica
         Replicas (writers of memories) whose experience may guide the search. The replica of this memory is always trusted. If
         the memory has experience of an untrusted replica, planning uses the mode ``strict``.
     labels : function, optional
-        A function that returns the labels of the scene's terms. The function is called when a text needs labels.
+        A function that returns the labels of the scene's terms. This function is called when a text needs labels.
     """
 
     linked: Links | Callable[[], Links]
@@ -148,7 +151,7 @@ class Memory(metaclass=RightNames):
         ----------
         scene : Scene
         plan : Plan, Result, Execution or file
-            An executed plan. If it is an execution, the method `live` is called.
+            An executed plan. For an execution, the method `live` is called.
         failed : path of a step, optional
             The failed step, or None. All earlier steps have succeeded, and no later step was executed.
 

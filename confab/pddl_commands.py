@@ -38,7 +38,8 @@ def import_pddl(domain: Path, problem: Path, out: Path, level: int = 1) -> Probl
     Raises
     ------
     KnowledgeError
-        The PDDL can't be used, or the scene can't be written. The message states file, line and column if known.
+        The PDDL can't be used, or the scene can't be written. The message states the file, the line and the column, if they are
+        known.
     """
     try:
         pddl = parse_files(domain, problem)
@@ -65,7 +66,7 @@ def exported(problem: Problem, level: int | None) -> Exported:
     Raises
     ------
     KnowledgeError
-        The scene has no such level, or no level at all.
+        The scene doesn't have the level, or has no level at all.
     """
     levels = problem.domain.levels
     if not levels:
@@ -83,7 +84,7 @@ def export_pddl(problem: Problem, level: int | None, folder: Path) -> tuple[Path
     Raises
     ------
     KnowledgeError
-        The scene has no such level, or no level at all, or the folder can't be written.
+        The scene doesn't have the level, has no level at all, or the folder can't be written.
     """
     found = exported(problem, level)
     paths = folder / "domain.pddl", folder / "problem.pddl"

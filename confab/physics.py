@@ -42,7 +42,7 @@ class SuccessJson(TypedDict):
 
 
 class SeenRolloutJson(RolloutJson):
-    """A rollout, with the final observed values of the symbols of goals."""
+    """A rollout, with the finally observed values of the symbols that have a goal."""
 
     seen: list[str]
 
@@ -63,9 +63,9 @@ class ReportJson(TypedDict):
 class Report(metaclass=RightNames):
     """The report of a verification: the rollouts (executions in simulation) of a plan, and the film of the first rollout.
 
-    A rollout is good if every primitive had the expected effects and no final observation contradicts a goal. Effects on
-    situation types that no perceiver reads aren't verified; `trusted` has the numbers of these effects. `perturb` and `noise` are
-    the parameters of `verify`.
+    A rollout is good if every primitive had the expected effects and no final observation contradicts a goal. Effects on a
+    situation type without a perceiver can't be verified; `trusted` has the numbers of these effects by situation type. `perturb` and
+    `noise` are the parameters of `verify`.
     """
 
     plan: Plan
@@ -109,7 +109,7 @@ class Report(metaclass=RightNames):
 
     @property
     def poured(self) -> float | None:
-        """The share of a serving that was poured, as the mean over all pours of all rollouts; None if nothing was poured."""
+        """The mean share of a serving that was poured, over all pours of all rollouts; None if nothing was poured."""
         shares = [share for rollout in self.rollouts for share in rollout.poured]
         return sum(shares) / len(shares) if shares else None
 
@@ -267,7 +267,7 @@ def verify(
     Raises
     ------
     KnowledgeError
-        The plan isn't applicable in the scene's initial state, the scene has no geometry, or the workers or a screen aren't
+        The plan isn't applicable in the scene's initial state, the scene has no geometry, or the workers or the screen aren't
         available.
     """
     number("rollouts", rollouts, "how often, e.g. 3")
@@ -308,7 +308,7 @@ def verify(
 
 
 def on_trust(scene: Known, expected: Sequence[State]) -> dict[str, int]:
-    """Return, by situation type, the numbers of changes between successive states that no perceiver reads."""
+    """Return, by situation type, the numbers of changes between successive states that no perceiver observes."""
     counts: dict[str, int] = {}
     for before, after in pairwise((scene.problem.initial, *expected)):
         for symbol in {*before, *after}:
@@ -344,7 +344,7 @@ def _shown(
     gui: bool,
     labels: Labels,
 ) -> Rollout:
-    """Execute the rollout with a seed, and film it, show it on the screen, or both."""
+    """Execute the rollout with a given seed. The rollout is filmed, shown on the screen, or both."""
     watching: list[Callable[[Engine], None]] = []
 
     def watch(world: Engine) -> None:

@@ -46,7 +46,7 @@ SITUATIONS = (
 def draw(scene: Known, path: Path, behavior: str | None = None, classes: bool = False) -> Path:
     """Draw a picture of a scene into a file, and return the file's path.
 
-    By default the picture shows the table with its places and the hands that reach them.
+    By default the picture shows the table with its places, and the hands that reach each place.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def class_tree(scene: Known) -> Figure:
 
 
 def _reduced(pairs: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
-    """Return pairs of a class and a subclass without redundant pairs, which reasoners write into files."""
+    """Return the pairs of a class and a direct subclass; other pairs, which reasoners write into files, are left out."""
     import networkx
 
     graph: networkx.DiGraph[str] = networkx.DiGraph(pair for pair in pairs if pair[0] != pair[1])
@@ -215,7 +215,7 @@ def _box(axes: Axes, x: float, y: float, words: str, color: str, size: int) -> N
 
 
 def _top(world: PhysicsWorld, name: str) -> Array:
-    """Return the middle of the top of a body, in metres in the world frame."""
+    """Return the middle of a body's top face, in metres in the world frame."""
     from confab.sim.bodies import outline
 
     rotation, base = world.truth(name)

@@ -38,12 +38,12 @@ class Options(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class PlanOptions:
-    """Options of a planning call, as `confab.planning.plan` describes them.
+    """Options of a planning call; `confab.planning.plan` describes these options.
 
     Raises
     ------
     KnowledgeError
-        The mode is unknown, the time limit is no number, or options exclude each other.
+        The mode is unknown, the time limit isn't a number, or options exclude each other.
     """
 
     memory: Memory | Links | str | Path | None = None
@@ -85,7 +85,7 @@ class PlanOptions:
 
     @property
     def asks_for_least(self) -> bool:
-        """Whether an option requires the optimal search, other than the option `mode`."""
+        """Whether an option besides `mode` requires the optimal search."""
         return self.optimal or self.minimise in ("cost", "steps")
 
     @property
@@ -95,7 +95,7 @@ class PlanOptions:
 
     @property
     def limit(self) -> float | Deadline | None:
-        """The time limit of the call; only the optimal search has a default, which is `OPTIMAL_SECONDS`."""
+        """The time limit of the call. Only the optimal search has a default limit, which is `OPTIMAL_SECONDS`."""
         return OPTIMAL_SECONDS if self.time_limit is None and self.strategy == "optimal" else self.time_limit
 
 

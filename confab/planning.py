@@ -59,13 +59,12 @@ if TYPE_CHECKING:
     from confab.why import Account, Because, WhyNot
 
 OURS = 0.6
-"""The share of the time limit that Confab's own search may use if an installed engine is tried, or the plan is scheduled, after
-the search.
+"""The share of the time limit that Confab's own search may use; the rest is for an engine, or for scheduling the plan.
 """
 OURS_WORK = 10_000_000
 """Maximum work of Confab's own search (states times operators) before an engine is tried, if there is no time limit.
 
-The search does this work in about twenty seconds.
+The search exhausts this maximum in about twenty seconds.
 """
 
 
@@ -90,7 +89,7 @@ def plan(
     ----------
     scene : Scene
     goals, goal : str or iterable of str
-        Facts like ``cup2 LOCATION location8``. Each replaces the scene's goal for the same symbol.
+        Facts like ``cup2 LOCATION location8``. Each goal replaces the scene's goal for the same symbol.
     memory : Memory, its file or endpoint, or Links alone in paper mode; optional
         The memory that guides the search; by default none.
     mode : str
@@ -102,20 +101,20 @@ def plan(
         Time limit of the call in seconds, or its deadline. Only the optimal search has a default limit, which is
         `OPTIMAL_SECONDS`.
     optimal : bool
-        Improve the plan until it is proved optimal or the time limit is reached. The result has the proved bound. A memory
-        can't be used.
+        Improve the plan until it is proved optimal or the time limit is reached. The result has the bound that was proved. The
+        optimal search can't use a memory.
     observed : str or Path, optional
         File of observed facts, which replace the scene's facts.
     engine : str, optional
-        An external planner (engine) of unified-planning, e.g. ``fast-downward``. By default, an installed engine is
-        tried if Confab's own search gives up and `leave_levels` is true. Confab's own search then has three fifths of
-        the time limit. Without a time limit, the engine is tried after about twenty seconds of search; if the engine
-        finds no plan, the search starts again without a limit. With ``none``, no engine is tried.
+        An external planner (engine) of unified-planning, e.g. ``fast-downward``. By default, an installed engine is tried if
+        Confab's own search gives up and `leave_levels` is true. If an engine may be tried, Confab's own search has three fifths
+        of the time limit. Without a time limit, the engine is tried after about twenty seconds of search; if the engine finds no
+        plan, the search starts again without a limit. With ``none``, no engine is tried.
     level : int, optional
         The level on which the engine plans; by default the lowest level.
     leave_levels : bool
-        Whether, if no plan of a level can be refined, steps of a lower level may replace steps of that level. The outcome names
-        the replaced parts and the conditions of the upper level that are violated.
+        Whether steps of a lower level may replace steps of a level on which no plan can be refined. The outcome names the
+        replaced parts of the plan, and the violated conditions of the upper level.
     minimise : str, optional
         With ``makespan``, the plan gets a schedule (`Result.timed`), in which equivalent actors may be exchanged. ``cost`` is the
         same as `optimal`. ``steps`` is the optimal search with a cost of 1 for every step. By default, the plan needn't be
@@ -291,7 +290,7 @@ def _plan(
 
 
 def _none_at_all(problem: Problem, deadline: Deadline) -> bool:
-    """Return whether half of the remaining time suffices for a proof that the task has no plan."""
+    """Return whether the task can be proved unsolvable in half of the remaining time."""
     limits = Limits(seconds=None if deadline.left is None else deadline.left / 2)
     return solve(Request(problem, limits=limits)).status is Status.UNSOLVABLE
 
@@ -354,7 +353,7 @@ class Result(metaclass=RightNames):
 
     `problem` has the individuals that the task can need. `queries` is the number of queries to the store. `part` is the part of
     the scene from which the problem was read; it is None for the whole scene. `goals` are the given goals, which replaced goals
-    of the task. `optimal` states whether the search looked for an optimal plan.
+    of the task for the same symbols. `optimal` states whether the search looked for an optimal plan.
     """
 
     scene: Known = field(compare=False)
@@ -368,7 +367,7 @@ class Result(metaclass=RightNames):
     optimal: bool = False
 
     def faults(self, plan: Plan) -> list[Fault]:
-        """Return the faults of a plan for the same task in the whole scene; the list is empty if the plan is valid."""
+        """Return the faults that a plan for the same task has in the whole scene; the list is empty if the plan is valid."""
         faults = validate(self.problem, plan)
         if faults or self.part is None:
             return faults
@@ -504,10 +503,10 @@ class Result(metaclass=RightNames):
         Parameters
         ----------
         asked : str
-            The alternative. It is a goal like ``cup2 LOCATION location8``, which ``by left_hand`` may follow, or a behaviour like
-            ``B2_PICK right_hand cup1`` or ``B2_PICK hand=right_hand``.
+            The alternative. An alternative is a goal like ``cup2 LOCATION location8`` or ``cup2 LOCATION location8 by
+            left_hand``, or a behaviour like ``B2_PICK right_hand cup1`` or ``B2_PICK hand=right_hand``.
         instead : Step, int, str or path, optional
-            The step that the behaviour would replace. By default, it is the most similar of the steps in whose place the
+            The step that the behaviour would replace. By default, the step is the most similar of the steps in whose place the
             behaviour is applicable.
         seconds : float, optional
             Time limit of the whole call.
@@ -557,7 +556,7 @@ class Result(metaclass=RightNames):
     def explain(self, step: AnyStep | None = None) -> Account | Because:
         """Return the reasons why each step is in the plan, or the reason why there is no plan.
 
-        With `step`, return why this step is in the plan, like `why`.
+        If `step` is given, return why this step is in the plan, as the method `why` does.
         """
         from confab.show import summary
         from confab.why import Account, account, proved
@@ -594,7 +593,7 @@ class Result(metaclass=RightNames):
     def dearer(self) -> str:
         """Return a remark on possible cheaper plans, and the option that searches for a cheaper plan.
 
-        The text is empty if nothing indicates a cheaper plan, or if the plan is proved optimal.
+        The text is empty if nothing suggests that a cheaper plan exists, or if the plan is proved optimal.
 
         Examples
         --------

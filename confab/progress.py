@@ -71,7 +71,7 @@ def progress_bar() -> Progress:
 
 
 def tell(what: str) -> None:
-    """If stderr is no terminal, print the present activity as a line on stderr."""
+    """If stderr isn't a terminal, print the present activity as a line on stderr."""
     if not quiet() and not sys.stderr.isatty():
         print(f"confab: {what}", file=sys.stderr, flush=True)
 

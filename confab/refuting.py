@@ -1,4 +1,7 @@
-"""Refutations: behaviours that were found to be impossible in physics, in a situation. The next plan and later calls avoid them."""
+"""Refutations: behaviours that were found to be physically impossible in a situation.
+
+The next plan and later calls avoid refuted behaviours.
+"""
 
 from __future__ import annotations
 

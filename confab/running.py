@@ -40,7 +40,8 @@ TOLD = 8
 class Job:
     """The arguments of `run`: a scene, goals, planning options, a target folder, and options for the film.
 
-    `memory` is the memory file to read and to write, or None. `noise` is the standard deviation of perceived positions in metres.
+    `memory` is the memory file that the run reads and writes, or None. `noise` is the standard deviation of perceived positions
+    in metres.
     """
 
     scene: str
@@ -134,7 +135,7 @@ def run(job: Job) -> int:
 
 
 def persuaded(scene: Scene, result: Result, job: Job, plan: Callable[[Scene], Result]) -> tuple[Scene, Result, Report]:
-    """Verify a plan in physics; as long as the verification refutes the plan, plan again.
+    """Verify a plan in physics. If the verification refutes the plan, plan and verify again.
 
     Return the scene with all refutations, the last result of planning, and the report of its verification. Refutations are
     saved if the next plan differs from the refuted plan.
@@ -170,8 +171,8 @@ def verified(scene: Scene, result: Result, job: Job) -> Report:
 def written(scene: Scene, result: Result, report: Report | None, learned: Memory | None, job: Job) -> dict[str, Path]:
     """Write the files of a run, and return their paths by kind.
 
-    Each run has a report and a record. If they are available, a plan, the verdicts and observed facts of a rollout, and a film
-    are written, too.
+    Each run has a report and a record. The plan, the verdicts and observed facts of a rollout, and the film are written if they
+    are available.
     """
     from confab.page.data import page_data
     from confab.page.frozen import write_page

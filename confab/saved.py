@@ -43,8 +43,8 @@ def read_episode(scene: Known, path: Path) -> Execution:
     scene : Scene
         The scene of the execution.
     path : Path
-        The output of ``confab execute --json``, or a JSON file of `Execution.save`. The file doesn't contain the states before
-        failures, or the static facts on which steps relied; the returned execution lacks them.
+        The output of ``confab execute --json``, or a JSON file of `Execution.save`. The returned execution lacks the states
+        before failures, and the static facts on which steps relied, since the file doesn't contain these data.
 
     Raises
     ------
@@ -169,9 +169,9 @@ def _read(path: Path, wanted: str) -> Iterator[Data]:
 def _interventions(
     problem: Problem, data: Data
 ) -> tuple[tuple[tuple[Intervention, float], ...], tuple[Intervention, ...], Problem]:
-    """Return the interventions that took place with their times, the other interventions, and the extended problem.
+    """Return the interventions that took place, with times; the interventions that didn't take place; and the extended problem.
 
-    The problem is extended by the individuals that were discovered or added during the execution.
+    The extended problem has the individuals that were discovered or added during the execution.
     """
     from confab.execution import parse_intervention
 

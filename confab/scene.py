@@ -72,7 +72,7 @@ class Scene(Known):
         Returns
         -------
         Path or PIL.Image.Image
-            The path of the file if a path is given, otherwise the picture.
+            The path of the picture's file if a path is given, otherwise the picture itself.
 
         Raises
         ------
@@ -97,7 +97,7 @@ class Scene(Known):
         Raises
         ------
         KnowledgeError
-            anywidget isn't installed. The extra `notebook` contains anywidget.
+            anywidget isn't installed. The extra `notebook` installs anywidget.
         """
         from confab.page.widget import board
 
@@ -136,9 +136,9 @@ class Scene(Known):
     ) -> Execution:
         """Execute the task in a closed loop of action and observation (`confab.execution.execute`).
 
-        The first plan is `plan`: a plan, a result, or the name of a plan file. New plans are made with `memory`. `Memory.live`
-        learns from the returned execution. With `watch`, a notebook or a terminal shows the execution. The function `observer` is
-        called with each event. After `time_limit` seconds the execution gives up.
+        The first plan is `plan`: a plan, a result, or the name of a plan file. During the execution, new plans are made with
+        `memory`. `Memory.live` learns from the returned execution. With `watch`, a notebook or a terminal shows the execution.
+        The function `observer` is called with each event. After `time_limit` seconds the execution gives up.
 
         Examples
         --------
@@ -236,7 +236,7 @@ class Scene(Known):
         Raises
         ------
         KnowledgeError
-            The scene has no such level, or the level has parts that PDDL can't express.
+            The scene doesn't have the level, or the level has parts that PDDL can't express.
         """
         from confab.pddl_commands import exported
 
@@ -261,7 +261,7 @@ class Scene(Known):
         Raises
         ------
         KnowledgeError
-            The scene has no such level, or the folder can't be written.
+            The scene doesn't have the level, or the folder can't be written.
         """
         from confab.pddl_commands import export_pddl
 
@@ -273,7 +273,7 @@ class Scene(Known):
         Raises
         ------
         confab.reasoner.limits.OutOfTimeError
-            The time limit for planning and explaining is over before the explanation is complete.
+            The time limit for planning and explaining has passed before the explanation is complete.
         """
         limit = options.get("time_limit")
         check_seconds("time_limit", limit)

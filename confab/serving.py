@@ -10,8 +10,8 @@ A GET of ``/page.json?after=VERSION`` is answered with status 204 if no newer ve
 
 The libraries uvicorn and starlette serve HTTP. Queries run in separate processes (`confab.reasoner.graph.query_process`). The
 processes are divided into lanes with growing time limits. If a query exceeds the limit of a lane, it is started again in the next
-lane, which has a lower priority. Short queries therefore never wait for long queries. A query is cancelled when its client
-disconnects. Requests from other machines and from web pages of other sites are refused.
+lane, which has a lower priority. Because of the lanes, short queries never wait for long queries. A query is cancelled when its
+client disconnects. Requests from other machines and from web pages of other sites are refused.
 """
 
 from __future__ import annotations
@@ -72,11 +72,11 @@ LARGEST, SLOWEST = 1_000_000, 20.0
 MOST = min(2_000, resource.getrlimit(resource.RLIMIT_NOFILE)[0] // 2)
 """Maximum number of open connections."""
 LAST_STATE = 2.0
-"""Maximum time in seconds for which a server, before it ends, waits until a page has received the last state of an execution."""
+"""Maximum time in seconds that a server waits before it stops, so that a page can receive the last state of an execution."""
 LOOPBACK = r"(localhost|127(\.\d{1,3}){3}|\[::1\])(:\d{1,5})?"
 ORIGIN = rf"https?://{LOOPBACK}"
 TARGET = re.compile(r"https?://(?P<host>[^/]*)(?P<path>/.*|)", re.IGNORECASE | re.DOTALL)
-"""Pattern of the target of a request, if the target contains a host."""
+"""Pattern that separates host and path in the target of an HTTP request."""
 SOLUTIONS = {
     "application/sparql-results+json": "sparql-json",
     "application/json": "sparql-json",
@@ -345,7 +345,7 @@ async def fault(request: Request, error: Exception) -> Response:
 
 
 async def while_connected(request: Request, work: Awaitable[T]) -> T:
-    """Return the result of a coroutine; if the client disconnects, cancel the coroutine and raise `ClientDisconnect`."""
+    """Return the result of a coroutine. If the client disconnects, cancel the coroutine and raise `ClientDisconnect`."""
 
     async def leaving() -> None:
         while (await request.receive())["type"] != "http.disconnect":
@@ -439,7 +439,7 @@ class Connection(H11Protocol):
             min(waiting, key=lambda c: c.deadline.when()).transport.abort()
 
     def handle_events(self) -> None:
-        """Handle received data, and end the time limit after the head of a request."""
+        """Handle received data. The time limit ends when the head of a request has been received."""
         before = self.cycle
         super().handle_events()
         if self.cycle is not before and not self.cycle.response_complete:

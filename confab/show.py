@@ -30,7 +30,7 @@ def page() -> Console:
 
 
 def show(what: Any) -> None:
-    """Print to stdout an object that rich can show; lines are wrapped in a terminal only."""
+    """Print an object that the library rich can show, to stdout; lines are wrapped only in a terminal."""
     page().print(what, markup=False, highlight=False)
 
 

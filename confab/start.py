@@ -36,6 +36,9 @@ def _leave(code: int) -> NoReturn:
 
 
 def _interrupted(*_: object) -> None:
-    """Print the message about an interrupt, and end the process. The module `confab.cli` may still be unimported."""
+    """Print the message about an interrupt, and end the process.
+
+    The function can't use the module `confab.cli`, whose import may not be complete yet.
+    """
     os.write(2, b"confab: interrupted; every file is unchanged or complete\n")
     os._exit(130)

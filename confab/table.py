@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Term: TypeAlias = "NamedNode | BlankNode | Literal | Triple"
 """An RDF term in a query result of the store."""
 STANDARD = {"sparql-json": "JSON", "sparql-xml": "XML", "tsv": "TSV", "sparql-csv": "CSV"}
-"""Result formats of the SPARQL 1.1 recommendations, each with its name in pyoxigraph."""
+"""Result formats of the SPARQL 1.1 recommendations, each with its format name in pyoxigraph."""
 
 
 class Row(tuple[str | None, ...]):
@@ -29,7 +29,7 @@ class Row(tuple[str | None, ...]):
     _fields: tuple[str, ...]
 
     def __new__(cls, cells: Iterable[str | None], names: tuple[str, ...]) -> Row:
-        """Return a row from its cells and the names of its columns."""
+        """Create a row from its cells and the names of its columns."""
         made = super().__new__(cls, cells)
         made._fields = names
         return made

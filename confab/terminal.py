@@ -114,7 +114,7 @@ def limited(seconds: float | None) -> Iterator[Deadline]:
 def ended_by(deadline: Deadline, ending: Ending | None) -> Iterator[None]:
     """End the process if a ``with`` block exceeds its time limit by a tenth, since a query of a store can't be interrupted.
 
-    Files that the block writes are complete or unchanged (`confab.reasoner.files.write_whole`).
+    If the process ends, every file that the block writes is either complete or unchanged (`confab.reasoner.files.write_whole`).
     """
     if deadline.left is None or ending is None:
         yield
@@ -136,7 +136,7 @@ def ended_by(deadline: Deadline, ending: Ending | None) -> Iterator[None]:
 
 
 def told(out: Path, text: str) -> None:
-    """Print the path of a written file and a text on stdout; if the file is stdout, print the text on stderr."""
+    """Print the path of a written file and a text on stdout. If stdout is the written file, print the text on stderr."""
     if out == Path("-"):
         remark(text)
     else:
@@ -206,11 +206,11 @@ PLAINER = (
     (r"([-\d.e+]+) is not in the range x>(=?)([-\d.e+]+)$", r"\1; wanted a number >\2 \3"),
     (r"([-\d.e+]+) is not in the range ([-\d.e+]+)<=x<=([-\d.e+]+)$", r"\1; wanted a number from \2 to \3"),
 )
-"""Patterns of click's messages about numbers, each with plain words that replace it."""
+"""Patterns of messages about numbers by the library click, each with plain words that replace the message."""
 
 
 def _usage(error: Any) -> str:
-    """Return the error of a wrong call in one line; for a call without arguments, print the help and exit."""
+    """Return the error of a wrong call of the command in one line; for a call without arguments, print the help and exit."""
     if type(error).__name__ == "NoArgsIsHelpError":
         error.show()
         sys.exit(MISUSE)

@@ -1,6 +1,6 @@
 """Conformance test of a robot's interface (`check_world`), which ``python -m confab.testing SCENE ROBOT`` runs.
 
-Each check reports a verdict with numbers. The robot executes the primitives of a plan; keep people away from a real robot.
+Each check reports a verdict with numbers. The robot executes the primitives of a plan: keep people away from a real robot.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def check_world(
     Parameters
     ----------
     world : World
-        The world. Its state must be the initial state of the problem, or a similar state.
+        The world, whose state must be the initial state of the problem or a similar state.
     problem : Problem
         The problem of a scene, which defines the primitives and the symbols of the world.
     steps : sequence of Step, optional
@@ -154,7 +154,7 @@ def _known(problem: Problem, symbol: Symbol, value: str) -> bool:
 
 
 def _refusal(world: Guarded, before: State, arguments: tuple[str, ...]) -> Check:
-    """Check that an unknown primitive fails with an error code and without effects."""
+    """Check that the execution of an unknown primitive fails with an error code and has no effects."""
     verdict = world.execute(Step((0,), 0, 1, "NO_SUCH_BEHAVIOUR", arguments))
     after = world.observe()
     changed = sorted(str(s) for s in after.keys() | before.keys() if after.get(s) != before.get(s))

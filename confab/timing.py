@@ -1,4 +1,4 @@
-"""Functions about schedules: they test whether a plan needs a schedule, and return schedules as text and JSON."""
+"""Functions that test whether a plan needs a schedule, and that return schedules as text and JSON."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Minimise: TypeAlias = Literal["makespan", "cost", "steps"]
 """The quantity that planning minimises."""
 MINIMISE: tuple[Minimise, ...] = ("makespan", "cost", "steps")
 WIDTH = 72
-"""Length of a lane, which represents the makespan, in characters."""
+"""Length of a lane in characters; a lane represents the whole makespan."""
 MOST_CRITICAL = 12
 """Maximum number of listed steps of the critical path."""
 
@@ -53,7 +53,7 @@ def has_times(problem: Problem) -> bool:
 
 
 def concurrent(problem: Problem, deadline: Deadline) -> tuple[Outcome, TimedPlan | None]:
-    """Plan with steps that overlap in time where necessary; return the outcome and the schedule."""
+    """Make a plan whose steps overlap in time if this is necessary; return the outcome and the schedule."""
     from confab.planner.timed.concurrent import plan
 
     outcome, timed = plan(problem, Limits(seconds=deadline.left))
@@ -63,7 +63,10 @@ def concurrent(problem: Problem, deadline: Deadline) -> tuple[Outcome, TimedPlan
 def scheduled(
     problem: Problem, outcome: Outcome, deadline: Deadline, shorten: bool
 ) -> tuple[Outcome, TimedPlan | None]:
-    """Schedule the plan of an outcome. If no schedule meets the times of the task, the outcome's status becomes "gave up"."""
+    """Schedule the plan of an outcome.
+
+    If no schedule meets the deadlines and windows of the task, the outcome's status becomes "gave up".
+    """
     from confab.planner.timed.call import best_in_time
 
     if outcome.plan is None:
@@ -80,7 +83,10 @@ def needs_others_meanwhile(problem: Problem) -> bool:
 
 
 def may_overlap_by_need(problem: Problem) -> bool:
-    """Return whether a condition or effect concerns the start or end of a step. Overlapping steps may then reach more goals."""
+    """Return whether a condition or effect concerns the start or end of a step.
+
+    With such conditions and effects, overlapping steps may reach more goals.
+    """
     return any(
         span is not Span.THROUGHOUT
         for behavior in problem.domain.behaviors.values()

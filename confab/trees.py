@@ -52,10 +52,10 @@ RESERVED |= {
 
 @dataclass(frozen=True)
 class Element:
-    """A node of a behaviour tree; BehaviorTree.CPP and py_trees support its kind.
+    """A node of a behaviour tree, of a kind that both BehaviorTree.CPP and py_trees support.
 
     The kinds are Fallback, Sequence, Once, Parallel, SubTree, Check, Set, Again, Condition and Action. The nodes Fallback and
-    Sequence begin with their first child in each tick. A node Once is a sequence that resumes at the running child. `name` is the
+    Sequence begin with their first child in each tick. A Once node is a sequence that resumes at its running child. `name` is the
     name of a subtree, of a leaf, or of a mark, which is the flag of a finished step. `key` identifies a leaf.
     """
 
@@ -106,7 +106,7 @@ def export_trees(problem: Problem, plan: Plan, folder: Path) -> tuple[Path, Path
 
 
 class _Lowering:
-    """Conversion of the nodes of a plan's behaviour tree into elements with numbered leaves."""
+    """Conversion of the nodes of a plan's behaviour tree into elements, in which leaves are numbered."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem

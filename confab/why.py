@@ -46,7 +46,7 @@ SHOWN = 3
 class Because:
     """The reasons why a step is in a plan: its effects (`gives`), and the steps and goals that need these effects (`needs`).
 
-    `number` names the step. For example, ``L2#3`` is step 3 of level 2, counted from 0.
+    The text `number` names the step. For example, ``L2#3`` is step 3 of level 2; steps are counted from 0.
     """
 
     number: str
@@ -112,8 +112,8 @@ class WhyNot:
     """The reasons why an alternative isn't in the plan.
 
     `answer` is the answer as a sentence. If the alternative is inapplicable, `lacks` has its failing conditions. If a complete
-    plan with the alternative was found, it is in `plan`, and `more` is the additional cost of this plan. If this plan violates
-    conditions of upper levels that the present plan doesn't violate, `breaks` has these conditions.
+    plan with the alternative was found, `plan` is this plan, and `more` is its additional cost. `breaks` has the conditions of
+    upper levels that the plan with the alternative violates, but not the present plan.
     """
 
     asked: str
@@ -345,9 +345,9 @@ def why_not(
     Parameters
     ----------
     asked : str
-        The alternative: a goal, or a behaviour. A goal is a fact like ``cup2 LOCATION location8``. It may be followed by ``by
-        hand2``: the individual ``hand2`` must then take part in the changes of the fact. A behaviour has arguments in the order
-        of its parameters, as in ``B2_PICK right_hand cup1``, or by name, as in ``B2_PICK hand=right_hand``. Sentences of
+        The alternative: a goal, or a behaviour. A goal is a fact like ``cup2 LOCATION location8``. After ``by hand2`` at the end
+        of a goal, the individual ``hand2`` must take part in the changes of the fact. A behaviour has arguments in the order of
+        its parameters, as in ``B2_PICK right_hand cup1``, or by name, as in ``B2_PICK hand=right_hand``. Sentences of
         explanations, such as ``pick cup 1 with right hand``, are also accepted.
     problem, plan
         The problem and its plan.

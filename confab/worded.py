@@ -39,7 +39,7 @@ def worded_fact(problem: Problem, labels: Labels, text: str) -> Fact | None:
 
 
 def _with_labels(problem: Problem, labels: Labels, text: str) -> str:
-    """Return a text in lower case with labels in place of the names of individuals."""
+    """Return a text in lower case, in which labels replace the names of individuals."""
     known = problem.individuals
     return " ".join(labels.name(word) if word in known else word for word in text.split()).lower()
 

@@ -1,7 +1,7 @@
 """Regression: translation of a condition after a behaviour to an equivalent condition before the behaviour.
 
 For example, ``IN(parcel) = van`` holds after LOAD(?item, ?into) in two cases: the parcel is ?item and the van is ?into, or the
-parcel isn't ?item and is in the van before. Conditions in alternatives and witnesses are translated, too. An equality of two
+parcel isn't ?item and is in the van before. Conditions inside disjunctions and witnesses are translated, too. An equality of two
 equal terms becomes true, and an equality of terms that can't denote the same individual becomes false.
 
 Source: R. Reiter, "Knowledge in Action" (2001), section 4.5; extended to functional situation types and numeric effects.
@@ -93,7 +93,7 @@ def negation(formula: Formula | Conjunction) -> Formula:
 
 
 def _binding(condition: Condition) -> bool:
-    """Return whether a condition may determine the value of a variable; the negation of the condition would not."""
+    """Return whether a condition may determine the value of a variable that the negated condition doesn't determine."""
     return isinstance(condition, ValueCondition) and not condition.negated and is_variable(condition.value)
 
 
@@ -108,7 +108,7 @@ class Afterwards:
     situations : mapping of name to SituationType
     classes : mapping of class to individuals
     kinds : dict of term to class
-        The classes of all terms in the behaviour and the conditions; classes of new variables are added.
+        The classes of all terms in the behaviour and the conditions. The translation adds the classes of new variables.
     holding : sequence of Condition, optional
         The preconditions that hold when the effects take place; by default, all preconditions.
     """
@@ -148,7 +148,10 @@ class Afterwards:
 
     @cached_property
     def amounts(self) -> tuple[AmountEffect, ...]:
-        """The effects on amounts; an effect for each member of a class is expanded unless the member is an argument."""
+        """The effects on amounts.
+
+        An effect for each member of a class is expanded, unless the member is an argument of the amount.
+        """
         found: list[AmountEffect] = []
         for effect in self.behavior.amounts:
             if effect.each is None or effect.each.name in effect.arguments:
@@ -299,21 +302,21 @@ class Afterwards:
     def linear(
         self, expression: Expression, operation: str = "increase", scaled: Scaled = lambda by: by
     ) -> list[Term] | None:
-        """Return the changing amounts in a linear expression, if effects only increase or decrease these amounts.
+        """Return the changing amounts in a linear expression; the effects must only increase or decrease these amounts.
 
         Parameters
         ----------
         expression : Expression
         operation : str
-            A key of `OPPOSITE`: the operation on the whole expression that an increase of this part causes.
+            The operation on the whole expression that an increase of the given part causes (a key of `OPPOSITE`).
         scaled : callable
-            Returns the change of the whole expression for a change of this part.
+            A function that returns the change of the whole expression for a change of the given part.
 
         Returns
         -------
         list of (Amount, str, callable) or None
-            Each amount, the operation on the whole expression that its increase causes, and a function that returns the change.
-            None if the expression isn't linear.
+            For each amount: the amount, the operation on the whole expression that its increase causes, and a function that
+            returns the change. None if the expression isn't linear.
         """
         found: list[list[Term] | None]
         match expression:
@@ -381,7 +384,7 @@ def _changed(now: Expression, operation: str, by: Expression) -> Expression:
 
 
 def closed(conditions: Iterable[Condition], bound: frozenset[str], kinds: Mapping[str, str]) -> tuple[Condition, ...]:
-    """Return conditions in which a witness quantifies each variable that occurs only in alternatives or in other witnesses.
+    """Return conditions in which witnesses quantify the variables that occur only inside disjunctions or other witnesses.
 
     >>> (found,) = closed([AnyOf(((ValueCondition("ON", ("?a",), "?b"),),))], frozenset({"?a"}), {"?b": "Shelf"})
     >>> found.alternatives[0][0].variable

@@ -191,7 +191,7 @@ def done(operation: str, amount: Number, by: Number) -> Number:
 
 @lru_cache(maxsize=2**12)
 def bounds(wanted: str) -> tuple[tuple[str, Fraction], ...]:
-    """Return the bounds that are the goal value of an amount, as pairs of operator and number.
+    """Return the bounds in the goal value of an amount, as pairs of an operator and a number.
 
     >>> bounds(">=2,<5"), bounds("3")
     ((('>=', Fraction(2, 1)), ('<', Fraction(5, 1))), (('=', Fraction(3, 1)),))

@@ -52,10 +52,10 @@ Properties: TypeAlias = "dict[str, list[str]]"
 STRINGS = ("sign", "change", "aggregate")
 """Properties whose values are words."""
 LITERALS = {"negated": "boolean", "amount": "decimal", "index": "integer"}
-"""Properties whose values are other literals, with the datatypes."""
+"""Properties whose values are literals of other datatypes, with the datatypes."""
 SIGNS = ("+", "-", "*", "/")
 DEEPEST = 50
-"""Maximum depth of nested conditions and calculations. Conjunctions (`:AllOf`) aren't counted."""
+"""Maximum depth of nested conditions and calculations. Conjunctions (`:AllOf`) don't count as levels."""
 MOST_CONDITIONS = 10_000
 """Maximum number of conditions inside one condition; a condition is counted each time that it occurs."""
 DECIMALS = 30
@@ -118,17 +118,19 @@ class NodeWriter:
     Parameters
     ----------
     prefix : str
-        The prefix of the core in the file.
+        The prefix that the file declares for the core ontology.
     spelled : callable
-        Returns the Turtle notation of an individual, class, relation or situation type.
+        A function that returns the Turtle notation of an individual, class, relation or situation type.
     named : callable
-        Returns the Turtle notation of a new node, given its kind (``condition``, ``amount``) and its position among the nodes.
+        A function that returns the Turtle notation of a new node, given its kind (``condition``, ``amount``) and its position
+        among the nodes.
     variable : callable
-        Returns the Turtle notation of a witness variable, given its name, the witness's node and the position of this node.
+        A function that returns the Turtle notation of a witness variable, given its name, the witness's node and the position of
+        this node.
     terms : mapping of variable to Turtle notation
-        Parameters and variables that are bound outside the conditions.
+        The parameters, and the variables that are bound outside the conditions, with their Turtle notation.
     boolean : callable, optional
-        Returns whether the value `TRUE` of a situation type can be omitted.
+        A function that returns whether the value `TRUE` of a situation type can be omitted.
 
     Attributes
     ----------
@@ -372,7 +374,7 @@ class NodeReader:
         return Parameter(self.term(iri), self.short(self.one(iri, "termType"))), ()
 
     def in_order(self, parts: Iterable[T]) -> tuple[T, ...]:
-        """Return the conjuncts of a conjunction, or the alternatives of a disjunction, in the order of the read condition."""
+        """Return the conjuncts of a conjunction, or the alternatives of a disjunction, in the order in which they are listed."""
         return tuple(parts)
 
     def entered(self, iri: str, what: str) -> None:

@@ -31,7 +31,7 @@ def write_whole(
 ) -> None:
     """Write a file atomically: readers see the old or the new content, even after a crash.
 
-    Raise the same errors as `written_whole`.
+    The errors are those of `written_whole`.
 
     Parameters
     ----------
@@ -56,14 +56,14 @@ def write_whole(
 def written_whole(path: Path, suffix: str = "") -> Iterator[Path]:
     """Provide a temporary file name in a ``with`` block, and replace `path` by this file at the end of the block.
 
-    Links are followed and permissions are kept. Folders, devices, read-only files, and files whose content is of another kind than
-    the new content (`confab.reasoner.kinds`) are never replaced.
+    Symbolic links are followed, and permissions are kept. Folders, devices, read-only files, and files whose content is of
+    another kind than the new content (`confab.reasoner.kinds`) are never replaced.
 
     Parameters
     ----------
     path : Path
     suffix : str
-        Suffix of the temporary file, for libraries that depend on it.
+        Suffix of the temporary file, for libraries that choose a format by the suffix.
 
     Raises
     ------
@@ -117,12 +117,12 @@ def check_replaceable(path: Path, kind: str) -> None:
 
 
 def check_folder(path: Path) -> None:
-    """Raise an error if more than the last folder of a path to be written is missing, or if a file is in place of a folder.
+    """Raise an error if a folder other than the last folder of a path is missing, or if a part of the path is a file.
 
     Raises
     ------
     FileNotFoundError
-        A folder is missing, because its name may be mistyped.
+        A folder is missing; its name may be mistyped.
     NotADirectoryError
         A part of the path is a file.
     """
@@ -140,7 +140,7 @@ def check_folder(path: Path) -> None:
 def made_folder(path: str | Path) -> Path:
     """Create a folder, and the folder that contains it, unless both exist; return the path.
 
-    Raise the same errors as `check_folder`.
+    The errors are those of `check_folder`.
     """
     check_folder(Path(path))
     Path(path).parent.mkdir(exist_ok=True)
@@ -167,7 +167,7 @@ def _replaceable(target: Path) -> os.stat_result | None:
 
 
 def _same_kind(target: Path, new: Kind | None) -> None:
-    """Raise `FileExistsError` if content of another kind mustn't replace a file."""
+    """Raise `FileExistsError` if new content is of another kind than a file, and must not replace the file."""
     old = kind_of(target)
     if old is not None and (new is None or not new.replaces(old)):
         what = "this output" if new is None or new.name == old.name else new.name
@@ -179,8 +179,8 @@ def _same_kind(target: Path, new: Kind | None) -> None:
 def alone(path: Path) -> Iterator[None]:
     """Lock a file during a ``with`` block; callers that lock another file in the same folder have to wait.
 
-    The folder is locked, so that no lock file remains. Links are followed, so that all paths to a file share one lock. A warning is
-    logged if the caller has to wait.
+    The folder is locked, so that no lock file remains. Symbolic links are followed, so that all paths to a file share one lock. A
+    warning is logged if the caller has to wait.
 
     Raises
     ------
@@ -229,7 +229,7 @@ def _behind(path: Path) -> Path:
 
 @contextmanager
 def silent_about_numbers() -> Iterator[None]:
-    """Suppress rdflib's warnings about literals that don't match their datatypes, during a ``with`` block."""
+    """During a ``with`` block, suppress rdflib's warnings about literals that don't match their datatypes."""
     spoken = logging.getLogger("rdflib.term")
     before, spoken.disabled = spoken.disabled, True
     try:

@@ -36,7 +36,7 @@ class Folding:
     kinds : mapping of term to class
         The class of each variable, except variables that a witness binds.
     known : set of Condition
-        Conditions that are true in the context.
+        The conditions that are known to be true.
     """
 
     classes: Mapping[str, Sequence[str]]
@@ -44,7 +44,7 @@ class Folding:
     known: frozenset[Condition] = frozenset()
 
     def effects(self, effects: Iterable[AmountEffect]) -> tuple[AmountEffect, ...]:
-        """Return the increases and decreases that may happen, with equal effects combined."""
+        """Return the increases and decreases of amounts that may happen; equal effects are combined."""
         found = Counter[AmountEffect]()
         for effect in effects:
             when = self.conjunction(effect.when)

@@ -89,7 +89,7 @@ def generate(family: str, objects: int = 4, hands: int = 2, clutter: int = 0, se
 def write_scene(path: Path, family: str, objects: int = 4, hands: int = 2, clutter: int = 0, seed: int = 0) -> None:
     """Write a generated scene to a file atomically, in pieces; the scene is named after the file.
 
-    The parameters are those of `generate`.
+    The parameters have the meaning of the parameters of `generate`.
     """
     write_whole(path, stamped(GENERATED, pieces(family, objects, hands, clutter, seed, path.stem)))
 
@@ -125,7 +125,7 @@ def pieces(family: str, objects: int, hands: int, clutter: int, seed: int, name:
 
 
 def _blocks(path: Path) -> list[tuple[str, str]]:
-    """Return the sections of a template with their texts, preceded by the sections of its ``like`` template."""
+    """Return the sections of a template with their texts; the sections of the template that ``like`` names come first."""
     found: list[tuple[str, str]] = []
     section, lines = "once", list[str]()
     for line in [*path.read_text(encoding="utf-8").splitlines(keepends=True), "#* end"]:
@@ -141,7 +141,7 @@ def _blocks(path: Path) -> list[tuple[str, str]]:
 
 
 def _rows(section: str, once: Row, layout: Layout, clutter: int, random: Random) -> Iterable[Row]:
-    """Return the rows of a section, each with a value for every word."""
+    """Return the rows of a section; a row has a value for every word of the section."""
     half = len(layout.starts) // 2
     if section == "hand":
         return ({"HAND": hand + 1} for hand in range(len(layout.reach)))
@@ -213,7 +213,9 @@ def _crowded(objects: int, hands: int, random: Random) -> Layout:
 
 
 def _opposite(objects: int, hands: int, random: Random) -> Layout:
-    """Return a layout with objects at places that only the first or only the last hand reaches, and goals on the other side.
+    """Return a layout in which objects have to change sides.
+
+    They are at places that only the first hand reaches, with goals that only the last hand reaches, or vice versa.
 
     Objects without a place on these sides stay at places in the middle.
     """
@@ -249,7 +251,7 @@ def _anywhere(objects: int, hands: int, random: Random) -> Layout:
 
 
 def _unreachable(objects: int, hands: int, random: Random) -> Layout:
-    """Return the layout of `_side_by_side`, in which no hand reaches the goal of one object of the second kind."""
+    """Return the layout of `_side_by_side`, changed so that no hand reaches the goal of one object of the second kind."""
     layout = _side_by_side(objects, hands, random)
     barred = random.choice(layout.goals[objects // 2 :])
     reach = [[place for place in places if place != barred] for places in layout.reach]

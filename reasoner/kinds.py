@@ -1,8 +1,8 @@
 """The kinds of files that Confab writes, recognised by their content.
 
 Reports, pictures and films contain the maker's name "Confab". Plans and verdicts have specific keys; memories and episodes have
-specific properties. Files for further editing (scenes, PDDL) end with a stamp, a comment with a hash of the content above it, so
-that an edited file is no longer recognised. All other files are foreign.
+specific properties. Files for further editing (scenes, PDDL) end with a stamp: a comment with a hash of the content above the
+stamp. An edited file is therefore no longer recognised. Confab considers all other files as foreign.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Kind:
     foreign : bool
         True for kinds of files that Confab doesn't write; such files are never overwritten.
     columns : tuple of str, optional
-        The columns of query results; None for unknown columns, and for files without columns.
+        The columns of query results; None if the columns are unknown, or if the file has no columns.
     """
 
     name: str

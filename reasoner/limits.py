@@ -36,7 +36,7 @@ class Deadline:
 
     @classmethod
     def after(cls, seconds: float | None) -> Deadline:
-        """Return the deadline in a number of seconds from now, or no deadline for None."""
+        """Return the deadline that is a number of seconds from now; return no deadline for None."""
         return cls() if seconds is None else cls(perf_counter() + seconds, seconds)
 
     @property
@@ -58,7 +58,7 @@ _current: ContextVar[Deadline] = ContextVar("deadline", default=Deadline())  # n
 
 @contextmanager
 def within(limit: Deadline | float | None) -> Iterator[Deadline]:
-    """Apply a deadline, or a limit in seconds from now, to a ``with`` block; provide the effective deadline.
+    """Apply a deadline, or a time limit in seconds, to a ``with`` block; provide the effective deadline.
 
     The effective deadline is the earlier of the given deadline and the current deadline.
 
@@ -79,7 +79,7 @@ def within(limit: Deadline | float | None) -> Iterator[Deadline]:
 
 @contextmanager
 def overtime(share: float = 0.1) -> Iterator[Deadline]:
-    """Extend the deadline by a share of the time limit, at least 0.1 s, for checking a result that was found in time.
+    """Extend the deadline by a share of the time limit (at least 0.1 s), so that a result that was found in time can be checked.
 
     Examples
     --------

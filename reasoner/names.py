@@ -68,7 +68,7 @@ class Names:
 
 
 class Named(dict[str, V]):
-    """A mapping that can't be edited. Its `KeyError` for a missing name suggests the most similar name."""
+    """A mapping that can't be edited. For a missing name, the mapping raises a `KeyError` that suggests the most similar name."""
 
     def __init__(self, kind: str, content: Mapping[str, V] | Iterable[tuple[str, V]], hint: str = "") -> None:
         super().__init__(content)
@@ -129,7 +129,7 @@ GUESSING: list[str] = []
 class RightNames(ABCMeta):
     """Metaclass of classes with `right_names`.
 
-    If a user asks such a class for an unknown attribute, the error suggests the call that creates an object.
+    If a user reads an unknown attribute of the class, the error suggests the call that creates an object.
     """
 
     if not TYPE_CHECKING:  # type checkers report wrong names by themselves
@@ -191,7 +191,7 @@ def right_names(kind: str, made: str = "") -> Callable[[C], C]:
 def known_as(kind: str) -> Callable[[C], C]:
     """Return a class decorator that adds the correct name to errors for unknown attributes of a value.
 
-    In contrast to `right_names`, the methods and the construction of the class stay as fast as they are.
+    In contrast to `right_names`, this decorator doesn't slow down the methods and the construction of the class.
     """
 
     def decorated(cls: C) -> C:
@@ -210,7 +210,10 @@ LONG = 60
 
 
 def brief(cls: C) -> C:
-    """Represent the values of a dataclass in one line: long collections by their length; empty and default fields are left out."""
+    """Let the values of a dataclass be represented in one line.
+
+    Long collections are represented by their length; empty fields and fields with default values are left out.
+    """
 
     def represented(self: object) -> str:
         told = []
@@ -296,9 +299,9 @@ class WrongNameError(AttributeError):
         Description of the object, e.g. ``a scene``.
     name : str
     there : object
-        The object or its class; its public names are determined by `dir`.
+        The object or its class, whose public names are determined by `dir`.
     verb : str
-        Empty for reading an attribute, ``set`` for setting it.
+        The empty text if an attribute was read, ``set`` if an attribute was set.
     """
 
     def __init__(self, kind: str, name: str, there: object, verb: str = "") -> None:

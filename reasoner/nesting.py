@@ -12,13 +12,13 @@ from xml.parsers import expat
 MOST_NESTED = 1_000
 """Maximum nesting depth of a document; all parsers in use can read this depth. Ontologies have about ten levels."""
 PIECE = 256
-"""Number of bytes that are counted together; the depth may be overestimated by this number."""
+"""Number of bytes that are counted at once; the depth may be overestimated by at most this number."""
 TURTLE = re.compile(
     rb'"""[^"\\]*(?:(?:\\.|"(?!""))[^"\\]*)*"""|\'\'\'[^\'\\]*(?:(?:\\.|\'(?!\'\'))[^\'\\]*)*\'\'\'|'
     rb'"[^"\\\n]*(?:\\.[^"\\\n]*)*"|\'[^\'\\\n]*(?:\\.[^\'\\\n]*)*\'|<[^<>"{}|^`\\\s]*>|#[^\n]*',
     re.DOTALL,
 )
-"""Literals, IRIs and comments of Turtle and related formats, in which brackets aren't counted."""
+"""Pattern of the literals, IRIs and comments of Turtle and related formats. Brackets in them aren't counted."""
 JSON = re.compile(rb'"[^"\\]*(?:\\.[^"\\]*)*"', re.DOTALL)
 OPENING, CLOSING = (b"[", b"(", b"{", b"<<"), (b"]", b")", b"}", b">>")
 

@@ -1,8 +1,8 @@
 """Detection of impossible states, with the same messages for all sources of states.
 
-Facts come from files, callers, observations, interventions and the board in notebooks. A value must belong to its situation type,
-an amount must be within its bounds, and an exclusive value may belong to only one individual. A symbol without a value is
-unknown, which is allowed.
+The facts of a state may come from files, callers, observations, interventions, or the page in a notebook. A value must belong to
+its situation type, an amount must be within its bounds, and an exclusive value may belong to only one individual. A symbol
+without a value is unknown, which is allowed.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def against_physics(problem: Problem, state: State) -> Iterator[Impossible]:
 
 
 def refuse_impossible(problem: Problem, before: State, after: State, cause: str = "") -> None:
-    """Raise `ImpossibleStateError` if a state is impossible for a reason that doesn't apply to the previous state.
+    """Raise `ImpossibleStateError` if a state is impossible for a reason that doesn't also apply to the previous state.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def refuse_impossible(problem: Problem, before: State, after: State, cause: str 
     before, after : State
         The previous state and the state to check.
     cause : str
-        Description of the transition, for the message.
+        A description of the transition, for the error message.
     """
     known = {fault.what for fault in impossible(problem, before)}
     for fault in impossible(problem, after):
@@ -163,7 +163,7 @@ def _had_twice(problem: Problem, state: State) -> Iterator[Impossible]:
 
 
 def _held_elsewhere(problem: Problem, state: State) -> Iterator[Impossible]:
-    """Yield objects that are at a place although a hand elsewhere holds them, and objects "in a hand" that no hand holds.
+    """Yield objects at a place that a hand at another place holds, and objects "in a hand" that no hand holds.
 
     While a hand grasps or releases an object, the object may be both in the hand and at its place.
     """

@@ -14,8 +14,8 @@ def never_done(problem: Problem) -> Iterator[tuple[Behavior, str]]:
     """Yield each relevant behaviour that no plan can contain in any state, with the reason.
 
     - A behaviour above the lowest level can't be refined if it always has an effect that no behaviour of a lower level can have.
-    - Every refinement and every plan must restore the rest values of symbols. A behaviour therefore can't be in a plan if it
-      always gives a symbol another value than the rest value, and no behaviour restores the rest value.
+    - Every refinement and every plan must restore the rest values of symbols. If no behaviour restores a symbol's rest value, no
+      plan contains a behaviour that always changes the symbol from this value.
     """
     domain = problem.domain
     values: dict[str, set[str]] = {}

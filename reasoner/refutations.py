@@ -1,7 +1,8 @@
 """Refutations by motion planning: a behaviour is physically impossible while some facts hold.
 
 A refutation becomes a precondition of the behaviour, both in the problem and in the ontology: with the refuted arguments, the
-behaviour isn't applicable while all facts hold. Planning, validation and explanation therefore need no special treatment.
+behaviour isn't applicable while all facts hold. Because refutations are preconditions, planning, validation and explanation need
+no special treatment of refutations.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ class Refutation:
         )
 
     def covers(self, other: Refutation) -> bool:
-        """Return whether this refutation is at least as general: it applies in every case in which `other` applies."""
+        """Return whether this refutation is at least as general as `other`: it applies in every case in which `other` applies."""
         same = self.behavior == other.behavior and {*self.facts} <= {*other.facts}
         return same and all(mine in ("", its) for mine, its in zip(self.arguments, other.arguments, strict=True))
 

@@ -1,4 +1,4 @@
-"""Conditions and amounts as English sentences, with the names or words that the caller provides."""
+"""Conditions and amounts as English sentences. A function of the caller provides the words for names and facts."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def said(condition: Condition, words: Words = str) -> str:
 
 
 def _sought(variable: str, kind: str, conditions: Sequence[Condition], negated: bool, words: Words) -> str:
-    """Return the clause that some, no, or every individual of a class satisfies conditions.
+    """Return the clause "some, no, or every individual of a class satisfies the conditions" in words.
 
     "Every" stands for a negated witness whose last condition is negated.
     """

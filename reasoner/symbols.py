@@ -73,7 +73,7 @@ class Perceived:
     by : str
         The perceiver.
     exclusive : bool
-        Whether only one individual at a time can have a value; several individuals can have a special value.
+        Whether only one individual at a time can have a given value. Special values are excepted.
     special : tuple of (str, str)
         Pairs of a name and a special value, e.g. ``("valueInHand", "in_hand")``.
     """
@@ -121,7 +121,7 @@ class ValueCondition:
 
     If the value is an unbound variable, the condition determines the variable's value.
 
-    A symbol that doesn't exist has no value: the condition is false, and its negation is true.
+    A symbol that doesn't exist has no value: a condition on this symbol is false, and the negated condition is true.
     """
 
     situation: str
@@ -175,8 +175,8 @@ class Witness:
 class Constraint:
     """A condition on every state: a situation type is never true, or is always true for all individuals of its argument classes.
 
-    If the constraint expresses that a situation type is true at most once, or only after another situation type, `about` has
-    these situation types.
+    `about` names the constrained situation types if the constraint expresses that a type is true at most once, or only after
+    another type.
     """
 
     situation: str
@@ -193,8 +193,8 @@ class Constraint:
 class AnyOf:
     """The condition that at least one alternative (a conjunction) is true; if negated, no alternative is true.
 
-    A disjunction doesn't bind variables for conditions outside the disjunction. If a precondition enforces a constraint, messages
-    name this `constraint`.
+    A disjunction doesn't bind variables for conditions outside the disjunction. If the condition is a precondition that enforces
+    a constraint, messages name this `constraint`.
     """
 
     alternatives: tuple[tuple[Condition, ...], ...]
@@ -204,7 +204,7 @@ class AnyOf:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A comparison of two numeric expressions by `operator` (a key of `amounts.COMPARING`); false if a value is missing."""
+    """A comparison of two numeric expressions by `operator` (a key of `amounts.COMPARING`). It is false if a value is missing."""
 
     left: Expression
     operator: str
@@ -222,7 +222,7 @@ class ValueEffect:
     """The effect that ``situation(arguments)`` becomes `value` if all conditions in `when` hold in the state before the behaviour.
 
     Conditions in `when` may determine variables. If the variable `each` is given, every member of its class has the effect. In a
-    `Problem`, one effect per member has replaced such an effect (`spread`).
+    `Problem`, an effect on every member of a class has been replaced by one effect per member (`spread`).
     """
 
     situation: str
@@ -236,9 +236,10 @@ class ValueEffect:
 class AmountEffect:
     """The effect that an amount is assigned, increased, decreased or scaled.
 
-    It takes place if all conditions in `when` hold in the state before the behaviour.
+    The effect takes place if all conditions in `when` hold in the state before the behaviour.
 
-    The number is evaluated in the state before the behaviour; changes of the same symbol are added.
+    The number by which the amount changes is evaluated in the state before the behaviour; several changes of one amount are
+    added.
     """
 
     situation: str
@@ -256,7 +257,7 @@ Effect: TypeAlias = "ValueEffect | AmountEffect"
 
 
 class Span(Enum):
-    """The part of a step's duration in which a condition must hold, or the end of the duration at which an effect takes place."""
+    """The part of a step's duration in which a condition must hold, or the time at which an effect takes place."""
 
     START = "atStart"
     THROUGHOUT = "throughout"  # an effect with this span takes place at the end
@@ -270,8 +271,8 @@ class Timing:
     Attributes
     ----------
     duration : Expression, optional
-        Seconds, evaluated in the state at the start. None stands for the duration of the refinement or, for a primitive behaviour,
-        the measured duration.
+        The duration in seconds, evaluated in the state at the start of the behaviour. None stands for the duration of the
+        refinement or, for a primitive behaviour, for the measured duration.
     actors : tuple of str
         Terms that denote the actors; an actor can take part in only one step at a time.
     conditions, effects : tuple of pairs
@@ -299,16 +300,16 @@ class Times:
     Attributes
     ----------
     deadlines : mapping of Symbol to seconds
-        The latest time at which each goal becomes true; the goal must hold from then on.
+        The deadline of each goal: the goal must become true at this time at the latest, and hold from then on.
     windows : mapping of individual to pairs of seconds
-        Time windows in which an individual is available; None as the end means no end. An individual without windows is always
-        available.
+        Time windows in which an individual is available; None as the end means that the window has no end. An individual without
+        windows is always available.
     measured : mapping of behaviour to seconds
         The average measured duration of behaviours without a stated duration.
     events : mapping of behaviour to seconds
         The fixed times of events, which no actor executes (PDDL's timed initial literals).
     of_actors : mapping of (behaviour, actor) to seconds
-        The average measured duration of a behaviour by an actor, which replaces the average of all actors.
+        The average measured duration of a behaviour by a certain actor, which is used in place of the average over all actors.
     """
 
     deadlines: Mapping[Symbol, Fraction] = field(default_factory=dict)
@@ -403,8 +404,8 @@ class Behavior:
 class Rule:
     """A rule of a derived situation type: its symbol is true in every state in which all conditions hold.
 
-    A symbol is true if at least one rule applies to the symbol, and false otherwise. States don't contain derived
-    symbols; their values are computed on demand. Rules may be recursive, but not through negation
+    A symbol is true if at least one rule applies to the symbol, and false otherwise. States don't contain derived symbols; their
+    values are computed on demand. Rules may be recursive, unless the recursion passes through a negation
     (`confab.reasoner.derivation`).
 
     Parameters
@@ -412,9 +413,9 @@ class Rule:
     situation : str
         A boolean situation type that no behaviour changes.
     parameters : tuple of Parameter
-        Names and classes of the arguments.
+        The names and classes of the arguments.
     variables : tuple of Parameter
-        Further variables, which the conditions determine.
+        Further variables, whose individuals the conditions determine.
     conditions : tuple of Condition
     """
 
@@ -427,7 +428,7 @@ class Rule:
     def behavior(self) -> Behavior:
         """The rule in the form of a behaviour that makes the situation type true.
 
-        Functions that search for achievers use this form.
+        Functions that search for achievers use rules in the form of behaviours.
         """
         head = ValueEffect(self.situation, tuple(p.name for p in self.parameters), TRUE)
         return Behavior(self.situation, 1, self.parameters, self.variables, self.conditions, (head,), 0.0)
@@ -453,9 +454,9 @@ class Aggregate:
     function : str
         One of `AGGREGATES`.
     amount : Expression
-        The aggregated number; 1 for a count.
+        The number that is aggregated; it is 1 for a count.
     parameters : tuple of Parameter
-        Names and classes of the arguments.
+        The names and classes of the arguments.
     variables : tuple of Parameter
         The variables over whose individuals the aggregate is computed.
     conditions : tuple of Condition
@@ -470,7 +471,7 @@ class Aggregate:
 
     @cached_property
     def kept(self) -> bool:
-        """Whether states contain the amount. They contain sums and counts; maxima and minima are replaced by conditions."""
+        """Whether states contain the amount. States contain sums and counts; conditions replace maxima and minima."""
         return self.function in ("sum", "count")
 
     @cached_property
@@ -504,10 +505,10 @@ class GroundBehavior:
 class Domain:
     """The situation types and behaviours of a domain, in declared order.
 
-    `rules` contains the rules of each derived situation type, and `aggregates` the derived amounts. `constraints` maps the name
-    of a derived count of violations, whose maximum is 0, to the constraint. `remembers` maps each remembered situation type to
-    the situation type that it remembers, in order of dependency: a remembered symbol becomes true when the symbol of the other
-    type with the same arguments becomes true, and stays true.
+    `rules` contains the rules of each derived situation type, and `aggregates` contains the rules of derived amounts.
+    `constraints` maps the name of a derived count of violations, whose maximum is 0, to the constraint. `remembers` maps each
+    remembered situation type to the original situation type that it remembers, in order of dependency. A remembered symbol
+    becomes true when the original symbol with the same arguments becomes true, and stays true.
     """
 
     situations: Mapping[str, SituationType]
@@ -542,10 +543,10 @@ class Problem:
     classes : mapping of class to individuals
         The members of each class and its subclasses, in declared order.
     relations : mapping of relation to set of tuples
-        Rows of static relations.
+        The rows of each static relation.
     initial : State
     goal : State
-        Goal values of some symbols.
+        The goal: values of some symbols.
     parents : mapping of class to its direct superclasses
         The superclasses are used by statistics that generalise over classes, and not by the search.
     value_levels : mapping of individual to level
@@ -553,7 +554,7 @@ class Problem:
     times : Times, optional
         Deadlines, time windows and measured durations (`confab.reasoner.timing`).
     weights : mapping of Symbol to Fraction
-        The costs of leaving goals unmet; goals without a weight must be met.
+        The cost of leaving each soft goal unmet; a goal without a weight must be met.
     """
 
     scene: str
@@ -591,7 +592,7 @@ class Problem:
         return {**self.at_rest(level), **self.goal}
 
     def at_rest(self, level: int) -> dict[Symbol, str]:
-        """Return the symbols on a level that initially have their rest value, with this value.
+        """Return the symbols on a level that initially have their rest value, together with this value.
 
         Boolean symbols that the initial state omits are included if a behaviour of the level changes their situation type.
         """
@@ -612,7 +613,7 @@ class Problem:
 
     @cached_property
     def individuals(self) -> frozenset[str]:
-        """The individuals of all classes."""
+        """All individuals of the problem's classes."""
         return frozenset[str]().union(*self.classes.values())
 
     @cached_property
@@ -711,10 +712,10 @@ def spread(behavior: Behavior, classes: Mapping[str, Sequence[str]]) -> Behavior
 
 
 def allowed(behavior: Behavior, situations: Mapping[str, SituationType]) -> tuple[Condition, ...]:
-    """Return preconditions that keep the amounts that a behaviour changes within bounds, as far as conditions can express this.
+    """Return preconditions under which a behaviour keeps amounts within their bounds, as far as conditions can express this.
 
-    Each precondition states that a bound isn't violated. It therefore holds for an amount that doesn't exist and that no effect
-    changes.
+    Each precondition states that a bound isn't violated. For an amount that doesn't exist, the precondition holds; an effect
+    doesn't change an amount that doesn't exist.
     """
     found: list[Condition] = []
     changed = [effect.situation for effect in behavior.amounts]

@@ -39,7 +39,8 @@ def projected(
 ) -> tuple[tuple[Condition, ...], tuple[Effect, ...]]:
     """Return the preconditions and effects of a behaviour that no other step overlaps.
 
-    Conditions that an effect at the start achieves are omitted, and so are effects at the start that a later effect overwrites.
+    A condition that an effect at the start achieves is omitted; an effect at the start that a later effect overwrites is omitted,
+    too.
     """
     given = {effect for span, effect in effects if span is Span.START and isinstance(effect, ValueEffect)}
     later = {(e.situation, e.arguments) for span, e in effects if span is not Span.START and not e.when and not e.each}
@@ -58,11 +59,12 @@ def projected(
 
 
 def only_during(problem: Problem) -> frozenset[str]:
-    """Return the behaviours that give a symbol a value only during their execution, if the value may be required elsewhere.
+    """Return the behaviours that give a symbol a value only during their execution, if this value may be required.
 
     The goal or another behaviour may require the value.
 
-    A plan with such a behaviour needs concurrency: in a sequence of steps, no other step ever finds the value.
+    A plan that uses a value of this kind needs concurrency: if steps are executed one after another, no other step ever finds the
+    value.
     """
     found = set[str]()
     for behavior in problem.domain.behaviors.values():
@@ -94,7 +96,7 @@ def _passing(behavior: Behavior) -> tuple[ValueEffect, ...]:
 
 
 def _asks(problem: Problem, behavior: Behavior, effect: ValueEffect) -> bool:
-    """Return whether a behaviour has a condition that may be satisfied by the value of an effect."""
+    """Return whether the value of an effect may satisfy a condition of a behaviour."""
     whens = [c for _, made in timing_of(behavior).effects for c in made.when]
     asked = [c for _, condition in timing_of(behavior).conditions for c in walk(condition)]
     kinds = dict(behavior.kinds)

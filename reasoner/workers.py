@@ -1,7 +1,8 @@
 """Child processes with a limit of CPU time; they end with their parent process, even if the parent process is killed.
 
-Each process has one end of a pipe whose other end belongs to the parent process. When the parent's end is closed, the Linux
-kernel kills the process and its children. No code has to run in the parent, even after ``kill -9`` or a crash.
+Each process has one end of a pipe; the other end belongs to the parent process. When the parent process's end of the pipe is
+closed, the Linux kernel kills the process and its children. The parent process needn't run any code to kill its children; they
+end even after ``kill -9`` or a crash of the parent.
 """
 
 from __future__ import annotations
@@ -133,7 +134,7 @@ def call(
     function : callable
         A function of a module; its output is discarded.
     *arguments
-        Arguments of the function; arguments and result are pickled.
+        The arguments of the function. Arguments and result are pickled.
     seconds : float
         Maximum CPU seconds.
     megabytes : int, optional

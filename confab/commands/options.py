@@ -16,7 +16,7 @@ from confab.reasoner.files import STDOUT
 from confab.reasoner.kinds import CONVERTED, EPISODE, GENERATED, IMPORTED, PLAN, VERDICTS
 
 TEXTS = ("", PLAN, VERDICTS, EPISODE, GENERATED, IMPORTED, CONVERTED)
-"""Kinds of content that a command can write to standard output. The empty text stands for query results."""
+"""Kinds of content that a command can write to standard output. The empty text is the kind of query results."""
 
 STDIN = Path("/dev/stdin")
 
@@ -52,7 +52,7 @@ class Output(click.Path):
         self.kind, self.may_be = kind, may_be
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return the path; fail if content of this kind can't be written to it."""
+        """Return the path; fail if content of this kind can't be written to the path."""
         path = Path(str(super().convert(value, param, ctx)))
         if path == STDOUT and self.kind not in TEXTS:
             self.fail(f"{self.kind or 'this'} can't be written to stdout; wanted the name of a file", param, ctx)

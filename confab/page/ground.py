@@ -33,8 +33,8 @@ class Area:
 class Ground:
     """The background of the map: positions of places, areas, connections between places, and positions of robots.
 
-    The x axis points to the right, and the y axis points down. If `metric` is true, positions are in metres, otherwise
-    positions have no unit. The text `note` tells users the source of the positions.
+    The x axis points to the right, and the y axis points down. If `metric` is true, positions are in metres, otherwise positions
+    have no unit. The text `note` tells the user where the positions come from.
     """
 
     spots: Mapping[str, Point]

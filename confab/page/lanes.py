@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from confab.labels import Labels
 
 MOST_FIXED = 5000
-"""Maximum number of rows for symbols that neither change nor have a goal. If there are more symbols, the page states only their
-number.
+"""Maximum number of rows for symbols that neither change nor have a goal. If more symbols are constant and without a goal, the
+page states only their number.
 """
 LAST = 0.04
 """Extension of the time axis after the last primitive, which shows the last effects, as a share of the plan's duration."""
@@ -28,7 +28,7 @@ def axis_end(timeline: Timeline) -> float:
 
 
 def rows_of(timeline: Timeline, labels: Labels) -> tuple[list[Row], int]:
-    """Return the rows of the timeline, and the number of symbols without a row."""
+    """Return the rows of the timeline, and the number of symbols that have no row."""
     by_path = timeline.by_path
     rows: list[Row] = []
     for level in sorted({step.level for step in timeline.plan.walk() if step.steps}):

@@ -1,4 +1,4 @@
-"""Construction of HTML in which text is escaped and markup isn't."""
+"""Construction of HTML: plain text is escaped, and markup is inserted unchanged."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def spaced(name: str) -> str:
 
 
 def plain(note: str) -> str:
-    """Return the note of a verdict without the measurements at the end of the note."""
+    """Return the note of a verdict without the measurements at its end."""
     return MEASURED.sub("", note)
 
 

@@ -52,7 +52,7 @@ def tree(
 
 
 def verdict(told: Verdict) -> str:
-    """Return the verdict of physics on a step as HTML."""
+    """Return the verdict on a step that was executed in physics, as HTML."""
     sign, tone = MEANT[bool(told.ok)]
     pairs = [
         tag("div", tag("dt", name.replace("_", " ")), tag("dd", number(value))) for name, value in told.measured.items()

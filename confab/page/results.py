@@ -61,7 +61,7 @@ class Executed(Protocol):
 
 
 def status_of(outcome: Outcome | None, report: Report | None, execution: Executed | None) -> tuple[bool | None, str]:
-    """Return whether a run succeeded (None if unknown), and the result of the run as text."""
+    """Return whether a run has succeeded (None if unknown), and the result of the run as text."""
     if execution is not None:
         return execution.reached, execution.episode.status.value
     if report is not None:

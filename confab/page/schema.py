@@ -159,7 +159,7 @@ class TurnableRow(TypedDict):
 class Turnable(TypedDict):
     """All symbols whose values the user can change, and the lists of their possible values.
 
-    Each list has a name; each value has a label.
+    Each list of values has a name, and each value has a label.
     """
 
     rows: list[TurnableRow]

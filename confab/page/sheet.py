@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from confab.reasoner.graph.knowledge import KnowledgeGraph
 
 MOST_SYMBOLS = 20_000
-"""Maximum number of symbols that the user can change on the page. If there are more symbols, the page states only their
+"""Maximum number of symbols that the user can change on the page. For a scene with more symbols, the page states only their
 number.
 """
 SECONDS = 10.0
@@ -81,7 +81,7 @@ class Sheet:
 
     @cached_property
     def symbols(self) -> dict[str, Symbol]:
-        """The symbols by their words, such as ``cup1 LOCATION``, with symbols of goals first."""
+        """The symbols by their words, such as ``cup1 LOCATION``; symbols of goals come first."""
         goal = self.problem.goal
         those = sorted({*self.problem.initial, *goal}, key=lambda s: (s not in goal, s.arguments, s.situation))
         return {" ".join((*s.arguments[:1], s.situation, *s.arguments[1:])): s for s in those}
@@ -140,7 +140,10 @@ class Sheet:
         return turned
 
     def _checked(self, key: str, value: object) -> str:
-        """Return a value of a symbol; raise `KnowledgeError` if the value is invalid. For an amount, any text is accepted here."""
+        """Return a value of a symbol; raise `KnowledgeError` if the value is invalid.
+
+        As the value of an amount, any text is accepted here.
+        """
         symbol = self.symbols[key]
         situation = self.problem.domain.situations[symbol.situation]
         known = self._values(symbol)

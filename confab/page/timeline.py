@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from confab.sim.verify import Rollout
 
 MOST_HANDS = 8
-"""Maximum number of lanes. A lane has all primitives with the same first argument, such as a hand. If there are more first
-arguments, all primitives share one lane.
+"""Maximum number of lanes. A lane has all primitives with the same first argument, such as a hand. If the primitives have more
+different first arguments, all primitives share one lane.
 """
 
 
@@ -61,7 +61,7 @@ class Timeline:
     """The primitives of a run with their times, and the values of symbols by period.
 
     `marks` are the times and texts of interventions and changes of the plan. `unit` is the unit of time. `final` is the last
-    state.
+    state of the run.
     """
 
     problem: Problem

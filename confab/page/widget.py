@@ -33,10 +33,7 @@ def board(scene: Known) -> anywidget.AnyWidget:
         raise KnowledgeError(MISSING) from error
 
     class Board(anywidget.AnyWidget):
-        """The widget.
-
-        Its properties, which are synchronised with the page, have the content, the user's changes, the queries and their results.
-        """
+        """The widget, whose properties (content, changes, queries, results) are synchronised with the page."""
 
         _esm = script()
         _css = asset("page.css")

@@ -47,13 +47,13 @@ def in_order(aggregates: Mapping[str, Aggregate]) -> list[Aggregate]:
 
 
 def read_by(aggregate: Aggregate) -> frozenset[str]:
-    """Return the situation types that an aggregate depends on directly."""
+    """Return the situation types on which an aggregate depends directly."""
     asked = (s for c in aggregate.conditions for inner in walk(c) for s in situations_of(inner))
     return situations_in(aggregate.amount).union(asked)
 
 
 def _followed(situations: frozenset[str], rules: Mapping[str, Sequence[Rule]]) -> set[str]:
-    """Return situation types together with all types that their definitions depend on."""
+    """Return situation types together with all types on which their definitions depend."""
     found, waiting = set[str](), [*situations]
     while waiting:
         name = waiting.pop()

@@ -88,7 +88,7 @@ def _solution(
 
 
 def _sought(variables: Sequence[Parameter], conditions: tuple[Condition, ...], negated: bool) -> Condition:
-    """Return the condition that some individuals satisfy the conditions, or, if `negated`, that no individuals satisfy them."""
+    """Return the condition that some individuals satisfy conditions or, if `negated`, that no individuals do."""
     found: Condition | None = None
     for variable in reversed(variables):
         found = Witness(variable.name, variable.kind, conditions if found is None else (found,))
@@ -112,7 +112,7 @@ def extrema_replaced(domain: Domain) -> Domain:
     Raises
     ------
     DomainError
-        An effect, a price, a duration or a sum reads a maximum or minimum; the message names both.
+        An effect, a price, a duration or a sum reads a maximum or minimum; the message names the reader and the amount.
     """
     aggregates = domain.aggregates
     if all(one.kept for one in aggregates.values()):

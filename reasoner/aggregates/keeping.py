@@ -1,19 +1,20 @@
 """Effects by which a behaviour updates a sum or a count.
 
 Soundness: A tuple of individuals contributes to a total if the tuple satisfies the aggregate's conditions. The contribution of a
-tuple can change only if an effect changes a symbol in these conditions or in the aggregated number. For each pair of an effect
-and a symbol in the aggregate, the *candidates* are the tuples whose contribution the effect may change: their symbol has the
-effect's arguments, and its value before or after the effect. If the conditions hold for a candidate only after the behaviour
-(`confab.reasoner.afterwards`), the candidate's number is added to the total. If the conditions hold only before the behaviour,
-the number is subtracted. A tuple that is a candidate of several pairs is counted for the first pair only.
+tuple can change only if an effect changes a symbol in the aggregate's conditions or in the aggregated number. Consider each pair
+of an effect and a symbol in the aggregate that the effect may change. The *candidates* of a pair of effect and symbol are the
+tuples for which the symbol has the effect's arguments, and the value before or after the effect. If the conditions hold for a
+candidate only after the behaviour (`confab.reasoner.afterwards`), the candidate's number is added to the total. If the conditions
+hold for a candidate only before the behaviour, the candidate's number is subtracted. A tuple that is a candidate of several pairs
+is counted for the first pair only.
 
 If the aggregated number is linear in the changing amounts (only additions and subtractions), each change of an amount changes the
 total directly. The change is added for every tuple that satisfies the conditions after the behaviour. The changes are independent
 of each other.
 
 If the maximum of a count is 0, no tuple contributes before a behaviour, and a single contributing tuple violates the bound.
-Therefore, nothing is subtracted from a count with maximum 0, and a tuple may be counted for several pairs. A tuple that only loses
-a value doesn't start to contribute, unless the condition on this value is negated.
+Nothing is therefore subtracted from a count whose maximum is 0, and a tuple may be counted for several pairs. A tuple that only
+loses a value doesn't start to contribute, unless the condition on this value is negated.
 """
 
 from __future__ import annotations
@@ -102,7 +103,7 @@ def _timed(
 ) -> Behavior:
     """Return a durative behaviour that changes a total at the same times as the facts on which the total depends.
 
-    The effects at the start and the effects at the end change the total separately, under the conditions for each of these times.
+    The behaviour's effects at the start and at the end change the total separately, each under the conditions of the same time.
     """
     timing = behavior.timing
     assert timing is not None
@@ -123,12 +124,12 @@ def _timed(
 
 @dataclass(frozen=True)
 class _Candidate:
-    """The tuples whose contribution to a total may change by an effect on a symbol of the aggregate.
+    """The tuples whose contribution to a total may be changed by one effect on one symbol of the aggregate.
 
     `effect` is a copy of the effect with its own variables. `named` are the arguments of the symbol and `value` its value (None
-    for an amount). If `before`, the tuples have the value that the symbol has before the effect, otherwise the value after the
-    effect. If the effect only changes one term of a linear number, `term` is this term; such an effect doesn't start or end a
-    contribution.
+    for an amount). If `before` is true, the tuples contain the value that the symbol has before the effect, otherwise the value
+    after the effect. If the effect only changes one term of a linear number, `term` is this term; such an effect doesn't start or
+    end a contribution.
     """
 
     effect: Effect
@@ -275,7 +276,7 @@ class _Keeping:
                 yield from self._differences(whole, each, [*guard, *more, *others])
 
     def _put(self, tuple_: dict[str, str], name: str, term: str) -> Formula:
-        """Replace a variable of the aggregate by a term in `tuple_`, and return the conditions that this requires."""
+        """Replace a variable of the aggregate by a term in `tuple_`, and return the conditions for this replacement."""
         if name in tuple_:
             return self.after.equal(tuple_[name], term)
         tuple_[name] = term
@@ -284,7 +285,10 @@ class _Keeping:
     def _completed(
         self, tuple_: Mapping[str, str], each: Parameter | None
     ) -> Iterator[tuple[dict[str, str], Parameter | None, list[Formula]]]:
-        """Yield tuples with a term for every variable: a determined term, a member of a class, or each individual in turn."""
+        """Yield tuples with a term for every variable.
+
+        A condition determines the term, or the term is a member of a class or each individual in turn.
+        """
         found, more = dict(tuple_), list[Formula]()
         determined = True
         while determined:
@@ -341,7 +345,10 @@ class _Keeping:
         yield from self._effects(tuple_, each, found)
 
     def _contributing(self, tuple_: Mapping[str, str]) -> tuple[list[Formula], Conjunction, Conjunction]:
-        """Return the conditions under which a tuple contributes: constant ones, and those before and after the behaviour."""
+        """Return the conditions under which a tuple contributes.
+
+        There are constant conditions, conditions before the behaviour, and conditions after the behaviour.
+        """
         conditions = [substituted(condition, tuple_) for condition in self.conditions]
         changing = [condition for condition in conditions if self.after.changed(condition)]
         always = [self.after.before(c) for c in conditions if not self.after.changed(c)]
@@ -361,7 +368,7 @@ class _Keeping:
 
 
 def _signed(condition: Condition, wanted: bool = True) -> Iterator[tuple[Condition, bool]]:
-    """Yield a condition and all conditions inside it, each with whether it occurs positively (not under a negation)."""
+    """Yield a condition and all conditions inside it, each with a flag that is false for a condition under a negation."""
     wanted = wanted is not condition.negated
     yield condition, wanted
     for group in groups(condition):

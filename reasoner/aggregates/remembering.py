@@ -1,9 +1,9 @@
 """Effects by which a behaviour updates a remembered situation type.
 
-A remembered symbol becomes true after a behaviour if the symbol that it remembers is true after this behaviour. This is also the
-condition under which the count of the remembered symbol's solutions changes from 0 to 1. Therefore the regression of counts
-(`confab.reasoner.aggregates.keeping`) also derives the effects on remembered symbols. The count gets the maximum 0, because the
-effects on such a count depend only on the state after the behaviour.
+A remembered symbol remembers an original symbol: a behaviour makes the remembered symbol true if the original symbol is true
+after the behaviour. The count of the original symbol's solutions, which is 0 or 1, becomes 1 under the same condition. The
+regression of counts (`confab.reasoner.aggregates.keeping`) therefore also derives the effects on remembered symbols. The count
+has the maximum 0, because the effects on a count with this maximum depend only on the state after the behaviour.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from confab.reasoner.symbols import (
 )
 
 NONE_ALLOWED = Quantity(whole=True, most=Fraction(0))
-"""The quantity of a count whose maximum is 0."""
+"""The properties of the amounts of a count whose maximum is 0."""
 
 
 def solutions_of(name: str, situation: SituationType, negated: bool = False) -> Aggregate:
@@ -44,7 +44,7 @@ def solutions_of(name: str, situation: SituationType, negated: bool = False) -> 
 def in_order_of_update(domain: Domain) -> list[Aggregate]:
     """Return the aggregates of a domain, and a count for each remembered situation type, in order of dependency.
 
-    Each count is 1 if the symbol that is remembered is true, and 0 otherwise.
+    The count of a remembered situation type is 1 if the original symbol is true, and 0 otherwise.
 
     Raises
     ------
@@ -55,12 +55,12 @@ def in_order_of_update(domain: Domain) -> list[Aggregate]:
 
 
 def count_of(name: str, domain: Domain) -> Aggregate:
-    """Return the count that is 1 for the arguments of a remembered situation type if the symbol that it remembers is true.
+    """Return the count that is 1 for the arguments of a remembered situation type if the original symbol is true.
 
     Raises
     ------
     DomainError
-        The definition of the remembered symbol is recursive.
+        The definition of the original situation type is recursive.
     """
     source = domain.remembers[name]
     count = solutions_of(name, replace(domain.situations[source], arguments=domain.situations[name].arguments))
@@ -68,9 +68,9 @@ def count_of(name: str, domain: Domain) -> Aggregate:
 
 
 def remembering(behavior: Behavior, count: Aggregate, domain: Domain, classes: Mapping[str, Sequence[str]]) -> Behavior:
-    """Return a behaviour that makes a remembered symbol true if the symbol that it remembers is true afterwards.
+    """Return a behaviour that makes a remembered symbol true if the original symbol is true after the behaviour.
 
-    A behaviour of a level that doesn't see the remembered situation type is unchanged.
+    A behaviour is returned unchanged if the remembered situation type doesn't exist on the behaviour's level.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def remembering(behavior: Behavior, count: Aggregate, domain: Domain, classes: M
 def _alone(effect: AmountEffect, classes: Mapping[str, Sequence[str]]) -> Iterator[AmountEffect]:
     """Yield an effect.
 
-    If each member of a class has the effect, and the member isn't an argument of the symbol, yield one effect per member.
+    For an effect on each member of a class that isn't an argument of the symbol, yield one effect per member.
     """
     if effect.each is None or effect.each.name in effect.arguments:
         yield effect

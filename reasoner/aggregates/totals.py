@@ -47,7 +47,7 @@ def with_totals(
 ) -> dict[Symbol, str]:
     """Return a state extended by the sums, the counts and the true remembered symbols that follow from the state.
 
-    The number of violations of a constraint is included only if effects change this number.
+    The number of violations of a constraint is included only if some effects change this number.
     """
     found = dict(state)
     changed = {effect.situation for behavior in domain.behaviors.values() for effect in behavior.amounts}

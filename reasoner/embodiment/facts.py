@@ -1,7 +1,7 @@
 """The graph's statements about bodies as tables: attributes, links, classes and indices of each node.
 
 The vocabulary is ``ontology/embodiment.ttl``. One query reads all attributes (data properties below ``:attribute``), and one
-query reads all links. All further accesses are lookups in these tables.
+query reads all links. All further accesses to statements about bodies are lookups in tables.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class BodyFacts:
 
     @classmethod
     def read(cls, store: ox.Store) -> BodyFacts:
-        """Return the facts in a store."""
+        """Read the tables from a store."""
         attributes: dict[str, dict[str, str]] = defaultdict(dict)
         links: dict[str, dict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
         for node, name, value in rows(store, ATTRIBUTES):
@@ -182,7 +182,7 @@ def rows(store: ox.Store, query: str) -> list[tuple[str, ...]]:
 
 
 def grouped(rows: Iterable[tuple[str, ...]]) -> Mapping[str, list[str]]:
-    """Return the second elements of pairs, grouped by the first element."""
+    """Return a mapping of the first elements of pairs to lists of their second elements."""
     groups: dict[str, list[str]] = defaultdict(list)
     for key, value in rows:
         groups[key].append(value)

@@ -51,7 +51,10 @@ TIME_LIMIT = 60.0
 
 @dataclass(frozen=True)
 class InterfaceCall:
-    """A robot's action that executes a behaviour; each argument is a constant or the position of a behaviour's parameter."""
+    """A robot's action that executes a behaviour.
+
+    Each argument of the action is a constant, or the position of a parameter of the behaviour.
+    """
 
     action: str
     arguments: Mapping[str, int | str]
@@ -79,7 +82,7 @@ class Reading:
 
 @dataclass(frozen=True)
 class Interface:
-    """The interface of a robot, with its calls by behaviour and the meanings of its result statuses.
+    """The interface of a robot, with the action for each behaviour and the meanings of result statuses.
 
     `robot_names` maps individuals to the robot's names for these individuals, if the names are different.
     """
@@ -102,11 +105,11 @@ def read_interface(store: ox.Store, names: Callable[[str], str], wanted: str) ->
     Parameters
     ----------
     store : pyoxigraph.Store
-        A scene or only an interface, with its imports.
+        A store with a scene, or only with an interface, together with the imports.
     names : callable
-        Returns the short name of an IRI, as used in plans.
+        A function that returns the short name of an IRI, as used in plans.
     wanted : str
-        Local name of the interface.
+        The local name of the interface.
 
     Raises
     ------

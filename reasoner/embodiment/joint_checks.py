@@ -16,7 +16,7 @@ def _links(embodiment: Embodiment) -> Iterator[Link]:
 
 
 def joint_that_stays(embodiment: Embodiment) -> Iterator[Flaw]:
-    """Yield links that are stated to move but whose joint is fixed or has no range."""
+    """Yield links that should move according to the ontology, but whose joint is fixed or has no range."""
     for link in _links(embodiment):
         reach = f"from {link.lower:g} to {link.upper:g}"
         if link.kind == "fixed" and (link.lower or link.upper):
@@ -77,7 +77,7 @@ def feature_off_its_part(embodiment: Embodiment) -> Iterator[Flaw]:
 
 
 def _least_distance(feature: Feature, part: Part) -> float:
-    """Return a lower bound of the distance between a feature and a part: the distance to the sphere around the part."""
+    """Return a lower bound of the distance between a feature and a part: the distance to the part's bounding sphere."""
     return math.dist(feature.position, part.position) - math.hypot(*part.size) / 2
 
 
@@ -144,7 +144,7 @@ def _without_flat_top(part: Part) -> bool:
 def _distance_beside(part: Part, point: tuple[float, float, float]) -> float:
     """Return the horizontal distance in metres of a point from an upright solid.
 
-    It is at most 0 for a point above, below or inside the solid.
+    The horizontal distance of a point above, below or inside the solid is at most 0.
     """
     dx, dy = point[0] - part.position[0], point[1] - part.position[1]
     if part.kind == "cylinder":

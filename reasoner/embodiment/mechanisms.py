@@ -9,7 +9,7 @@ from confab.reasoner.embodiment.facts import BodyFacts, EmbodimentError
 from confab.reasoner.embodiment.values import Feature, Link, Mechanism, Part
 
 KINDS = {"box": ("size_x", "size_y", "size_z"), "cylinder": ("radius", "radius", "height"), "sphere": ("radius",) * 3}
-"""The attributes that state the size of a solid, for each kind of solid; a stated radius is doubled."""
+"""The attributes that state the size of a solid, for each kind of solid. From a radius, the size is twice the radius."""
 
 JOINTS = ("revolute", "prismatic", "fixed")
 
@@ -33,7 +33,7 @@ def _mechanism(facts: BodyFacts, node: str, names: Callable[[str], str], folders
 
 
 def _check_parents(facts: BodyFacts) -> None:
-    """Raise `EmbodimentError` if a link isn't part of exactly one mechanism or is part of itself."""
+    """Raise `EmbodimentError` unless each link is part of exactly one mechanism and not part of itself."""
     mechanisms = {*facts.members("Mechanism")}
     for node in facts.ordered(node for node, links in facts.links.items() if "part_of" in links):
         above = [node]
@@ -113,7 +113,7 @@ def _part(facts: BodyFacts, node: str, names: Callable[[str], str], folders: Seq
 
 
 def _feature(facts: BodyFacts, node: str, names: Callable[[str], str]) -> Feature:
-    """Return a feature; the last part of the feature's IRI after a dot is the feature's name."""
+    """Return the feature of a node. The name of the feature is the part of its IRI after the last dot."""
     return Feature(
         names(node).rsplit(".", 1)[-1],
         facts.position(node, "0"),

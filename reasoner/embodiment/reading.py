@@ -35,7 +35,7 @@ PALETTE: tuple[Color, ...] = (
     (0.20, 0.55, 0.90, 1.0),
     (0.55, 0.75, 0.20, 1.0),
 )
-"""Colours of the fillings without a stated colour, in declared order."""
+"""Colours of the fillings for which no colour is stated, in declared order."""
 
 
 def read_embodiment(
@@ -48,7 +48,7 @@ def read_embodiment(
     store : pyoxigraph.Store
         The scene with its imports; the union of all named graphs is read.
     names : callable
-        Returns the short name of an IRI, as used in plans.
+        A function that returns the short name of an IRI, as used in plans.
     folders : sequence of Path
         Folders in which URDF files and meshes are searched.
 
@@ -165,7 +165,7 @@ def _fillings(facts: BodyFacts, names: Callable[[str], str]) -> dict[str, Fillin
 
 
 def _robots(facts: BodyFacts) -> list[str]:
-    """Return the nodes with a URDF file that aren't mechanisms."""
+    """Return the nodes that have a URDF file and aren't mechanisms."""
     return [node for node in facts.having("urdf") if node not in facts.members("Mechanism")]
 
 

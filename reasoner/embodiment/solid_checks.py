@@ -1,8 +1,8 @@
 """Validation rules on overlapping solids: joints moved through their range, and objects in the initial state.
 
 Each joint of a mechanism is moved from `lower` to `upper`. The moved links must not overlap the base of their mechanism,
-neighbouring links or furniture. A neighbouring link that can move may be shut or fully open. An overlap with such a link is a
-fault only if it occurs in both cases.
+neighbouring links or furniture. A neighbouring link that can move may be shut or fully open. An overlap with a link that can move
+is a fault only if it occurs both when this link is shut and when it is open.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ JOINT = "perceive_joint"
 """The perceiver that distinguishes an open joint from a shut joint."""
 
 DEEP = 0.0015
-"""Maximum overlap in metres of two solids that are considered to be only in contact."""
+"""Maximum overlap in metres at which two solids still count as being only in contact."""
 
 SAMPLES = 33
 """Number of joint values at which the links are checked."""

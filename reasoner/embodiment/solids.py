@@ -68,7 +68,7 @@ class Block:
         return turned
 
     def directions(self) -> Array:
-        """Return normals (n, 3) of the surface, which are tested as directions of separation."""
+        """Return normals (n, 3) of the solid's surface, which are tested as directions of separation."""
         if self.kind != "cylinder":
             normals: Array = self.rotation.T
             return normals
@@ -80,7 +80,7 @@ class Block:
 def overlap(one: Block, other: Block) -> float:
     """Return the distance in metres by which a solid must be moved to be separated from another solid.
 
-    It is negative if there is a gap.
+    The distance is negative if there is a gap between the solids.
     """
     apart = other.center - one.center
     if not apart.any():
@@ -121,7 +121,7 @@ def _about(axis: Vector, angle: float) -> Array:
 
 
 def frames(mechanism: Mechanism, values: Mapping[str, float]) -> dict[str, Frame]:
-    """Return the world frames of a mechanism's base and links for given joint values (by link, 0 by default)."""
+    """Return the world frames of a mechanism's base and links for given joint values; a joint without a value is at 0."""
     found: dict[str, Frame] = {
         mechanism.name: (rotation((0.0, 0.0, mechanism.yaw)), np.array(mechanism.position, dtype=float))
     }
@@ -182,7 +182,7 @@ def body_blocks(body: Body, frame: Frame) -> Iterator[Block]:
 def place_frame(
     embodiment: Embodiment, name: str, where: Mapping[str, str], values: Mapping[str, float]
 ) -> Frame | None:
-    """Return the world frame of a place for given places of objects (`where`) and joint values; None for an unknown frame.
+    """Return the world frame of a place for given places of objects (`where`) and joint values, or None.
 
     The carrier of a place may be an object, which is itself at a place.
     """

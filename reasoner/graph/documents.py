@@ -1,7 +1,8 @@
 """Safe reading of RDF documents: RDF/XML is passed to the parser without external or recursive entities.
 
-The XML parser expat reads the declaration of the document type. A declaration with only plain entities then replaces it. (Protégé
-4 abbreviates namespaces by plain entities.) Comments, instructions and other declarations before the first element are removed.
+The XML parser expat reads the declaration of the document type, which is then replaced by a declaration with only plain entities.
+(Protégé 4 abbreviates namespaces by plain entities.) Comments, instructions and other declarations before the first element are
+removed.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ class DocumentError(ValueError):
 
 
 def document(file: Path) -> tuple[bytes, ox.RdfFormat]:
-    """Return the content of an RDF file that can be passed to its parser, and its format.
+    """Return the content of an RDF file in a form that is safe for the parser, and the file's format.
 
     Raises
     ------
@@ -91,7 +92,7 @@ def document(file: Path) -> tuple[bytes, ox.RdfFormat]:
 
 
 def safe(content: bytes, form: ox.RdfFormat, base: str) -> tuple[bytes, ox.RdfFormat]:
-    """Return a document, and its format, that a parser reads in time and memory proportional to its size.
+    """Return a document and its format. A parser can read the document in time and memory that are proportional to its size.
 
     Deep nesting is rejected in every format. JSON-LD, in which each level may repeat its context, is parsed in a separate process
     and returned as TriG.
@@ -101,7 +102,7 @@ def safe(content: bytes, form: ox.RdfFormat, base: str) -> tuple[bytes, ox.RdfFo
     DocumentError
         The document is nested too deeply, or its parsing takes too much time or memory.
     SyntaxError
-        The document is invalid in its format.
+        The document isn't valid in its format.
     """
     json = form == ox.RdfFormat.JSON_LD
     xml = form == ox.RdfFormat.RDF_XML

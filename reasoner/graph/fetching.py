@@ -1,7 +1,7 @@
 """Download of ontologies from the web on request; the catalog maps the IRI of an ontology to the downloaded file.
 
-Loading itself never uses the network. A downloaded document is stored only if it is RDF of bounded size, has no external or
-recursive entities, imports no file paths, and is an ontology with the requested IRI.
+The loading of scenes never uses the network. A downloaded document is stored only if it is an ontology with the requested IRI, is
+of bounded size, has no external or recursive entities, and imports no file paths.
 """
 
 from __future__ import annotations
@@ -66,8 +66,8 @@ def fetch(url: str, folder: Path) -> Fetched:
     Raises
     ------
     KnowledgeError
-        The URL can't be reached, or the document is invalid, too large, unsafe or another ontology. No file is written
-        in these cases.
+        The URL can't be reached, or the document is invalid, too large, unsafe, or not the requested ontology. If an error is
+        raised, no file is written.
     """
     try:
         parts = urlsplit(url)

@@ -1,7 +1,7 @@
 """OWL 2 RL inference before planning, which adds inferred triples to the graph `inferred`.
 
-Only static facts are inferred. Facts of situation types are excluded, because behaviours change these facts; from their
-properties, only domains and ranges are used. A class that is defined by situations is compiled into conditions instead
+Only static facts are inferred. Facts of situation types are excluded, because behaviours change these facts; only the domains and
+ranges of their properties are used. A class that is defined by situations is compiled into conditions instead
 (`confab.reasoner.reading.definitions`).
 
 Subclasses are read without inference. The reasoner runs only if `needed` finds other axioms that have consequences. The limits of
@@ -65,7 +65,7 @@ def infer(graph: KnowledgeGraph, *, always: bool = False) -> int:
     graph : KnowledgeGraph
         The knowledge graph, whose graph `inferred` is cleared first.
     always : bool
-        Whether to run the reasoner even if `needed` returns False.
+        Whether to run the reasoner in any case, even if `needed` returns False.
 
     Raises
     ------

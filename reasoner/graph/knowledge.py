@@ -1,8 +1,8 @@
 """The knowledge graph: ontology files with all their imports in one SPARQL store.
 
-Each kind of triples has its own named graph (`GRAPHS`); a query is evaluated on their union. Files are only read.
-Nothing is downloaded (only `confab.reasoner.graph.fetching` downloads, on request): imports are looked up in the
-catalog in the file's folder, then in the shipped catalog.
+Each kind of triples has its own named graph (`GRAPHS`); a query is evaluated on their union. Files are only read, never changed.
+Nothing is downloaded (only `confab.reasoner.graph.fetching` downloads, on request): imports are looked up in the catalog in the
+file's folder, then in the shipped catalog.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Remote(Protocol):
         """Return the result of a query. If `noted`, the store remembers the query, and `confirm` repeats the query later."""
 
     def confirm(self) -> None:
-        """Raise `KnowledgeError` if the result of a noted query has changed."""
+        """Repeat the noted queries; raise `KnowledgeError` if a result has changed."""
 
 
 class KnowledgeError(ValueError):
@@ -204,7 +204,7 @@ class KnowledgeGraph:
 
     @property
     def folders(self) -> list[Path]:
-        """Folders in which files that ontologies refer to are searched: the shipped folder and the folder of each loaded file."""
+        """The folders in which files that ontologies mention are searched: the shipped folder and each loaded file's folder."""
         own = (file.parent for file in self.files.values() if not file.is_relative_to(ontology.ROOT))
         return list(dict.fromkeys([ontology.ROOT, *own]))
 
@@ -227,7 +227,7 @@ def load(
     tolerant : bool
         Whether to load an RDF file even if it isn't a complete scene; the attribute `faults` of the graph then has the reasons.
     faults : list of Fault, optional
-        Receives the faults in behaviours that are written as updates; without the list, such faults raise an error.
+        A list that receives the faults in behaviours that are written as updates. Without the list, a fault raises an error.
 
     Raises
     ------

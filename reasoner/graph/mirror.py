@@ -30,7 +30,7 @@ class Mirror:
         self._seen = self._lines()
 
     def pull(self) -> int:
-        """Transfer the changes of the world since the last call to the graph `asserted`, and return their number."""
+        """Transfer to the graph `asserted` the changes of the world since the last call, and return their number."""
         now = self._lines()
         added, removed = now - self._seen, self._seen - now
         name = ox.NamedNode(BASE + "asserted")

@@ -67,7 +67,10 @@ Answer: TypeAlias = "tuple[str, list[str], Any]"
 
 @dataclass(frozen=True)
 class QueryLimits:
-    """Limits of a query: seconds, rows, megabytes of memory; `service` permits ``SERVICE`` clauses (other endpoints)."""
+    """Limits of a query: seconds, rows, and megabytes of memory.
+
+    With `service`, ``SERVICE`` clauses are permitted, which query other endpoints.
+    """
 
     seconds: float = SECONDS
     rows: int = ROWS
@@ -110,7 +113,7 @@ def _dumped(graph: KnowledgeGraph) -> bytes:
 class QueryWorker:
     """A process that executes queries on a copy of a graph.
 
-    The process starts, and copies the graph, at the first query. The process ends with the ``with`` block or with its parent
+    At the first query, the process starts and copies the graph. The process ends with the ``with`` block or with its parent
     process. An interrupted query, or a query that exceeds its limits, doesn't end the process.
 
     Parameters
@@ -149,7 +152,7 @@ class QueryWorker:
     def interrupt(self) -> None:
         """Stop the query for which another thread is waiting.
 
-        The thread's call of `ask` then raises `LimitError`. While the process starts, nothing is done.
+        The call of `ask` in the other thread then raises `LimitError`. A process that is still starting isn't interrupted.
         """
         if self._sending.acquire(blocking=False):
             self._send(None)
@@ -304,7 +307,7 @@ def unknown_prefixes(graph: KnowledgeGraph, query: str) -> list[str]:
 
 
 def core_names(graph: KnowledgeGraph, query: str) -> str:
-    """Return a query in which ``:Behavior`` denotes the core's class if the scene's own ``:`` namespace has no such name."""
+    """Return a query in which ``:Behavior`` denotes the class of the core, unless the scene's own namespace ``:`` has this name."""
     own = graph.spoken.get("", CORE)
     if own == CORE or "" in DECLARED.findall(query):
         return query

@@ -1,7 +1,8 @@
 """Stores for a scene's triples besides memory: an Oxigraph store on disk, and any SPARQL 1.1 endpoint.
 
-A store on disk is filled from the files once, and again after a file has changed. An endpoint is only read, by a few large
-queries. An endpoint contains all triples in one default graph, or a named graph for each ontology with the ontology's IRI.
+A store on disk is filled from the files when it is created, and again after a file has changed. An endpoint is only read, by a
+few large queries. An endpoint contains all triples in one default graph, or a named graph for each ontology with the ontology's
+IRI.
 """
 
 from __future__ import annotations
@@ -66,7 +67,7 @@ class Endpoint:
     Parameters
     ----------
     url : str
-        A user name and password in the URL are sent as basic authentication, and removed from the URL.
+        The endpoint's URL. A user name and password in the URL are sent as basic authentication, and removed from the URL.
     authorization : str, optional
         Value of the Authorization header.
     timeout : float
@@ -123,7 +124,7 @@ class Endpoint:
         query : str
         prefixes : mapping of prefix to namespace
         bindings : mapping of variable to IRI
-            Values of selected variables.
+            The values of variables that the query selects.
         noted : bool
             Whether `confirm` repeats the query.
 
@@ -163,7 +164,7 @@ class Endpoint:
         Raises
         ------
         KnowledgeError
-            A result has changed, or `query` fails.
+            The result of a noted query has changed, or `query` fails.
         """
         for (body, accept), digest in self.noted.items():
             if _digest(self._post(body, accept)[0]) != digest:

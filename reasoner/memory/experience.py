@@ -13,8 +13,8 @@ Experience  all learned items, with grow-only tallies by replica and epoch, whic
 Rules, orders, methods and kinds of goals are named by a hash of their content. Equal items of two replicas therefore have equal
 names, and a union of the replicas merges equal items. An item has one tally per lifted fact (`Fact`). The tally of the empty fact
 counts all uses of the item; the tally of another fact counts only uses in which the individuals in the item's roles satisfied the
-fact. Tallies of epoch 0 never age. Each further epoch belongs to one episode of a replica, and contains preferences between
-individuals (for example between two hands), whose weight decays with later episodes.
+fact. The weight of tallies of epoch 0 never decays. Each further epoch belongs to one episode of a replica. Its tallies are
+preferences between individuals, for example between two hands; their weight decays with every later episode.
 """
 
 from __future__ import annotations
@@ -31,12 +31,14 @@ from confab.reasoner.symbols import Fact as Goal
 Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
 """A behaviour and its arguments."""
 Fact: TypeAlias = "tuple[str, str]"
-"""A question about the individuals in the roles of an item, and the answer. Both are empty texts for the item itself."""
+"""A question about the individuals in the roles of an item, and the answer. For the tally of all uses of an item, question and
+answer are empty texts.
+"""
 ITSELF: Fact = ("", "")
 
 
 class LearningError(ValueError):
-    """Raised if a plan isn't applicable in the scene's initial state, so that nothing can be learned from it."""
+    """Raised if nothing can be learned from a plan, because the plan isn't applicable in the scene's initial state."""
 
 
 def _named(kind: str, said: object) -> str:
@@ -80,8 +82,9 @@ class Rule:
 class Order:
     """A learned order: goals of one situation type are achieved before goals of another situation type.
 
-    `first` and `then` are the situation types. `shared` contains the pairs of positions at which the two goals have the same
-    individual; positions count the arguments from 0, and the value is last.
+    `first` is the situation type of the goals that are achieved first, and `then` is the situation type of the other goals.
+    `shared` contains the pairs of positions at which the two goals have the same individual; positions count the arguments from
+    0, and the value is last.
     """
 
     first: str
@@ -95,7 +98,7 @@ class Order:
 
     @classmethod
     def of(cls, first: Goal, then: Goal, constants: frozenset[str]) -> Order:
-        """Return the order of two goals, with the positions of shared individuals except `constants`."""
+        """Return the learned order of two goals. Shared individuals are noted by their positions, except `constants`."""
         one, other = (*first.symbol.arguments, first.value), (*then.symbol.arguments, then.value)
         shared = [(i, j) for i, a in enumerate(one) for j, b in enumerate(other) if a == b and a not in constants]
         return cls(first.symbol.situation, then.symbol.situation, tuple(shared))
@@ -153,7 +156,7 @@ Said: TypeAlias = "Rule | Order | Method | GoalKind"
 
 @dataclass(frozen=True)
 class Tally:
-    """Numbers of times that a candidate was chosen and succeeded, was passed over, and was chosen but failed."""
+    """The numbers of times that a candidate was chosen and succeeded, was passed over, or was chosen but failed."""
 
     chosen: int = 0
     passed_over: int = 0

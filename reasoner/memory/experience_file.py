@@ -3,8 +3,8 @@
 Each learned item is written once (`confab.reasoner.memory.rules_file`). A counter exists for each replica, epoch and item
 (`:countsFor`). The property `:associatedWith` links the counter to the item and to the lifted facts that held. An ``owl:Axiom``
 on each of these links has the numbers `:chosen`, `:passedOver` and `:failed`, and the resulting `:probability`. Replicas never
-share a counter, and all other nodes are named by their content, so that the union of two files contains both memories. A rule
-that was edited in the file keeps its tallies.
+share a counter, and the names of all other nodes are derived from their content. The union of two files therefore contains both
+memories. A rule that was edited in the file keeps its tallies.
 
 A `:DurationStatistic` exists for each replica, behaviour and actor. The property `:durationStatistic` links the behaviour to
 it, and an ``owl:Axiom`` on this link has the numbers `:mean`, `:spread` and `:count`.
@@ -83,7 +83,7 @@ class Lines:
 
     @cached_property
     def triples(self) -> list[ox.Triple]:
-        """The triples of `rest`; raises `SyntaxError` for invalid Turtle."""
+        """The triples in the text `rest`; invalid Turtle raises `SyntaxError`."""
         return [q.triple for q in ox.parse(self.rest, format=ox.RdfFormat.TURTLE, base_iri=MEMORY)]
 
 

@@ -16,8 +16,8 @@ Conclusion: TypeAlias = "tuple[str, tuple[str, ...]]"
 class Links:
     """The probability tables of the paper, section III-C.
 
-    `tables` contains a categorical distribution over values for each learned pair of conclusion and symbol. All other pairs have
-    the uniform distribution.
+    `tables` contains a categorical distribution over values for each learned pair of conclusion and symbol. For each other pair,
+    the distribution is uniform.
 
     >>> Links().probability(("MOVE", ("cup",)), Symbol("LOCATION", ("cup",)), "shelf", ["shelf", "table"])
     0.5

@@ -72,7 +72,7 @@ def load_links(path: Path, names: Names, found: Lines | None = None) -> Links:
 
 
 def memory_names(path: Path, found: Lines | None = None) -> tuple[str, Names]:
-    """Return the IRI of the scene that a memory file imports, and short names for its terms; `found` as in `load_links`.
+    """Return the IRI of the scene that a memory file imports, and short names for the terms in the file.
 
     Raises
     ------

@@ -40,7 +40,7 @@ def label(one: Said) -> str:
 
 
 class RuleWriter:
-    """Writer of learned items as Turtle; names that the scene doesn't contain become IRIs of the memory."""
+    """Writer of learned items as Turtle. Names that the scene doesn't contain become IRIs in the memory's namespace."""
 
     def __init__(self, names: Names, words: Words = label) -> None:
         self.names, self.words = names, words
@@ -70,7 +70,7 @@ class RuleWriter:
         return head + "".join(f"{line} .\n" for line in lines[1:])
 
     def rule(self, rule: Rule, me: str) -> list[str]:
-        """Return the properties of a rule as the first text, followed by the statements of its parts."""
+        """Return texts: first the properties of a rule, then the statements of the rule's parts."""
         terms = {role: f"{me}.{quote(role[1:], safe='')}" for role, _ in rule.kinds}
         nodes = _RuleNodes(me, self.term, terms)
         goal, *asks = map(nodes.condition, (rule.goal, *rule.asks))
@@ -89,7 +89,7 @@ class RuleWriter:
         return " ; ".join([f":does {self.term(does[0])}", *(f":{a} {t}" for a, t in zip(ARGUMENTS, put, strict=False))])
 
     def method(self, method: Method, me: str) -> list[str]:
-        """Return the properties of a method as the first text, followed by the statements of its parts."""
+        """Return texts: first the properties of a method, then the statements of the method's parts."""
         roles = [f"{me}.role{i}" for i in range(method.roles + len(method.open))]
         steps = [f"{me}.step{i}" for i in range(len(method.steps))]
         lines = [f":refines {self.term(method.behavior)} ; :roles {method.roles} ; :step {', '.join(steps)}"]

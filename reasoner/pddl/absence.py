@@ -1,4 +1,4 @@
-"""Extra predicates of an exported domain that express "no individual of a class has this value" without quantifiers."""
+"""Extra predicates of an exported domain, which express "no individual of a class has this value" without quantifiers."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Kept:
                     self.keep(behavior, *absent)
 
     def absent(self, condition: Condition) -> tuple[str, str, str] | None:
-        """Return class, situation type and value of a condition "no individual of the class has this value"; else None."""
+        """Return class, situation type and value of a condition "no individual of the class has this value", else None."""
         match condition:
             case Witness(variable, kind, (ValueCondition(situation, (about,), value, False),), True):
                 known = situation not in self.problem.domain.rules and not self.words.situations[situation].boolean

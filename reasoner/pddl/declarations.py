@@ -26,9 +26,8 @@ class Typed:
 class Action:
     """A parsed action; the names in `precondition` and `effect` have been checked against the declarations.
 
-    The precondition and effect of a durative action are those of the action as a whole
-    (`confab.reasoner.pddl.durative`). `durative` contains the conditions and effects of a durative action with their
-    times; None for other actions.
+    For a durative action, `precondition` and `effect` describe the action as a whole (`confab.reasoner.pddl.durative`).
+    `durative` contains the conditions and effects of a durative action with their times; None for other actions.
     """
 
     name: str
@@ -50,7 +49,10 @@ class Axiom:
 
 @dataclass
 class Pddl:
-    """A parsed domain and problem, in which all names have been declared and all numbers of arguments have been checked."""
+    """A parsed domain and problem.
+
+    The parser has checked that all names are declared and that all numbers of arguments are right.
+    """
 
     domain: str = "domain"
     problem: str = "problem"

@@ -27,7 +27,7 @@ class Durative:
 
 
 class NotTimedError(ValueError):
-    """Raised if a part of a durative action has no time or an unsupported time; `at` is the part's position in the text."""
+    """Raised if a part of a durative action states no time or an unsupported time; `at` is the part's position in the text."""
 
     def __init__(self, at: Word | Form, text: str) -> None:
         super().__init__(text)

@@ -73,7 +73,7 @@ def to_pddl(
     Raises
     ------
     KnowledgeError
-        A behaviour gives a symbol a value only during its execution, and another behaviour or the goal may require this value.
+        Another behaviour or the goal may require a value that a behaviour gives a symbol only during its execution.
     """
     if names := sorted(only_during(problem)):
         raise KnowledgeError(

@@ -43,7 +43,10 @@ FormChange: TypeAlias = "tuple[Form, tuple[Form, ...], tuple[Typed, ...]]"
 
 
 def typed_in(form: Form) -> list[Typed]:
-    """Return the variables, with their types, that a list such as ``(?x ?y - truck)`` declares; its syntax has been checked."""
+    """Return the variables, with their types, that a list such as ``(?x ?y - truck)`` declares.
+
+    The syntax of the list must be correct.
+    """
     found: list[Typed] = []
     waiting: list[Word] = []
     items = iter(form.items)
@@ -95,9 +98,9 @@ def spread(form: Form, objects: Callable[[str], Sequence[str]], holds: Callable[
     form : Form
         A formula without free variables.
     objects : callable
-        Returns the objects of a type.
+        A function that returns the objects of a type.
     holds : callable
-        Returns whether an atom always or never holds; None if its truth may change.
+        A function that returns True for an atom that always holds, False for an atom that never holds, and None for other atoms.
     """
     rest = [item for item in form.items[1:] if isinstance(item, Form)]
     if form.head == "and":
@@ -183,7 +186,7 @@ def _changes(form: Form | None, when: tuple[Form, ...] = (), variables: tuple[Ty
 
 
 def functions_read(form: Form | None) -> Iterator[str]:
-    """Yield the head of each list inside a form, except the function that a numeric effect changes."""
+    """Yield the first word of each list inside a form, except the function that a numeric effect changes."""
     if form is None:
         return
     for item in form.items[2 if form.head in CHANGES else 0 :]:

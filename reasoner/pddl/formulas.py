@@ -99,7 +99,7 @@ class Or:
 
 @dataclass(frozen=True)
 class Exists:
-    """An existential quantification; a universal quantification is the negation of an existential quantification."""
+    """An existential quantification. A universal quantification is expressed as the negation of an existential quantification."""
 
     variables: tuple[Term, ...]
     inner: Formula
@@ -157,7 +157,7 @@ def no(formula: Formula, yes: bool = True) -> Formula:
 
 
 def some(variables: Iterable[Term], formula: Formula) -> Formula:
-    """Return a formula existentially quantified over variables; variables that the formula doesn't mention are dropped."""
+    """Return a formula with an existential quantifier for the variables that the formula mentions."""
     variables = tuple(variables)
     if formula == FALSE or not all(one.members for one in variables):
         return FALSE
@@ -167,7 +167,7 @@ def some(variables: Iterable[Term], formula: Formula) -> Formula:
 
 
 def same(left: Term, right: Term) -> Formula:
-    """Return the equality of two terms: true for equal terms, false for terms without a common individual."""
+    """Return the equality of two terms. It is true for equal terms, and false for terms that can't denote the same individual."""
     if left == right:
         return TRUE
     return Same(left, right) if left.members & right.members else FALSE

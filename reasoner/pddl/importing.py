@@ -17,10 +17,9 @@ any other function              situation type whose values are amounts, unless 
 goal that isn't a fact          precondition of the behaviour ``REACH_GOAL``, whose effect is the goal
 ==============================  ================================================================
 
-Invariant synthesis finds mutually exclusive predicates. At most one of these predicates holds for an object initially,
-and an action that adds one of these predicates for an object deletes another of these predicates for the object.
-Helmert, "Concise finite-domain representations for PDDL planning tasks", Artificial Intelligence 173 (2009), section 5,
-without its search for inequalities.
+Invariant synthesis finds mutually exclusive predicates. Of mutually exclusive predicates, at most one holds for an object
+initially, and an action that adds one of them for an object deletes another one. Helmert, "Concise finite-domain representations
+for PDDL planning tasks", Artificial Intelligence 173 (2009), section 5, without its search for inequalities.
 """
 
 from __future__ import annotations
@@ -80,7 +79,7 @@ THING = "Thing"
 """The class of all objects, PDDL's ``object``."""
 REACH_GOAL = "reach-goal"
 WORLD, THE_WORLD = "World", "the_world"
-"""The class and the individual that are the argument of situation types for predicates without arguments."""
+"""A class with a single individual, which is the argument of situation types for predicates without arguments."""
 BASE = "https://w3id.org/confab/pddl/"
 
 
@@ -88,7 +87,7 @@ BASE = "https://w3id.org/confab/pddl/"
 class Place:
     """The translation of a predicate: its situation type, the positions of the object and the value, and possibly a fixed value.
 
-    The fixed value is used if no argument of the predicate is the value.
+    The fixed value is used for a predicate of which no argument is the value.
     """
 
     situation: str
@@ -335,8 +334,8 @@ class _Import:
     def goal(self, situations: dict[str, SituationType]) -> tuple[dict[Symbol, str], Behavior | None]:
         """Return the goal as values of symbols, and the behaviour ``REACH_GOAL``.
 
-        The preconditions of ``REACH_GOAL`` are the conjuncts of the PDDL goal. The behaviour is None if all conjuncts are facts or
-        always hold.
+        The preconditions of ``REACH_GOAL`` are the conjuncts of the PDDL goal. The behaviour ``REACH_GOAL`` is None if all
+        conjuncts of the goal are facts or always hold.
         """
         found: dict[Symbol, str] = {}
         parts = list(conjuncts(self.pddl.goal))
@@ -356,7 +355,7 @@ class _Import:
         return goal, reach
 
     def preferences(self, situations: Mapping[str, SituationType], goal: dict[Symbol, str]) -> dict[Symbol, Fraction]:
-        """Add the soft goals to the goal, and return their weights in the metric; soft goals without a weight are omitted.
+        """Add the soft goals to the goal, and return their weights in the metric. A soft goal without a weight is omitted.
 
         Raises
         ------
@@ -411,7 +410,8 @@ class _Import:
     def signatures(self) -> dict[str, list[str]]:
         """The types of each predicate's arguments.
 
-        A type is the lowest common supertype of the declared type and of all variables that occur as the argument.
+        The type of an argument is the lowest common supertype of the declared type and of all variables that occur as this
+        argument.
         """
         found = {name: [one.type for one in signature] for name, signature in self.pddl.predicates.items()}
         parts = [(action.parameters, (action.precondition, action.effect)) for action in self.pddl.actions.values()]
@@ -493,7 +493,10 @@ class _Import:
         return replace(behavior, price=price, preconditions=(*conditions, Comparison(price, ">=", Fraction(0))))
 
     def price(self, name: str) -> Expression | None:
-        """Return the cost of an action: the weighted sum of its increases of functions in the metric; None without increases."""
+        """Return the cost of an action: the weighted sum of the increases of functions in the metric.
+
+        Return None for an action without increases of these functions.
+        """
         found: Expression | None = None
         for effect in self.numeric[name]:
             if effect.function.head not in self.weights or effect.when or effect.variables:
@@ -604,7 +607,7 @@ class _Import:
         yield from (dict(zip(names, row, strict=True)) for row in product(*things))
 
     def replaced(self, end: Effect, effects: Sequence[Effect]) -> bool:
-        """Return whether an effect that ends a symbol's value is always accompanied by an effect that gives a new value."""
+        """Return whether another effect always gives a new value to the symbol whose value an effect ends."""
         symbol = replace(self.atom(end.atom), value="")
         return any(
             e.true and e.atom[0] in self.places and replace(self.atom(e.atom), value="") == symbol
@@ -670,8 +673,8 @@ class _Variables:
     ) -> tuple[Condition, ...]:
         """Return conditions that are true if some individuals satisfy all conjuncts in `pieces`.
 
-        Each existential quantifier is moved as far inward as possible. A search for "a car and a place such that …" then doesn't
-        enumerate all pairs unless a conjunct mentions both variables.
+        Each existential quantifier is moved as far inward as possible. As a result, a search for "a car and a place such that …"
+        enumerates pairs only if a conjunct mentions both variables.
         """
         left = dict(typed)
         while left:

@@ -1,9 +1,10 @@
 """Invariant synthesis for a PDDL domain.
 
 An invariant is a set of predicates of which at most one fact holds for each object in every reachable state. The predicates of an
-invariant form one state variable of the object. An invariant starts as a guess with one changing predicate. The guess is proved
-if every action that adds a fact of the invariant also deletes a fact of the invariant. If the proof fails for an action, a
-predicate that the action deletes is added to the guess. For example, *in* is added to *at*.
+invariant form one state variable of the object. The search for an invariant starts with a guess that contains one changing
+predicate. The guess is proved if every action that adds a fact of the invariant also deletes a fact of the invariant. If the
+proof fails for an action, a predicate that the action deletes is added to the guess. For example, the predicate *in* is added to
+the predicate *at*.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ COUNTED: Mapping[int, tuple[tuple[int, int | None], ...]] = {1: ((0, None),), 2:
 class Part:
     """A predicate of an invariant, with the positions of the object (`key`) and of the value (`counted`) among its arguments.
 
-    `counted` is None for a predicate of one argument; the predicate itself is then the value.
+    For a predicate of one argument, `counted` is None, and the predicate itself is the value.
     """
 
     predicate: str
@@ -56,7 +57,7 @@ class Invariants:
     sets: Mapping[str, frozenset[str]]
 
     def found(self) -> list[tuple[Part, ...]]:
-        """Return the proved invariants, of which no two share a predicate; each invariant is a tuple of its parts."""
+        """Return the proved invariants; no predicate is in two of them. Each invariant is a tuple of its parts."""
         candidates: list[tuple[Part, ...]] = [
             (Part(predicate, key, counted),)
             for predicate, signature in self.pddl.predicates.items()
@@ -94,7 +95,7 @@ class Invariants:
         return all(number == 1 for number in count.values())
 
     def distinguishable(self, parts: Sequence[Part]) -> bool:
-        """Return whether an object and a value always determine which predicate of the invariant relates them."""
+        """Return whether at most one predicate of the invariant can relate a given object and a given value."""
         counted = [p for p in parts if p.counted is not None]
         of = {p.predicate: p for p in counted}
         for predicate, domains in self.mentioned:
@@ -138,7 +139,7 @@ class Invariants:
         return found
 
     def domain_of(self, action: Action, term: str) -> frozenset[str]:
-        """Return the objects that a term of an action may denote, according to its type and the static preconditions on it."""
+        """Return the objects that a term of an action may denote, according to the term's type and static preconditions."""
         if not term.startswith("?"):
             return frozenset({term})
         kind = next((p.type for p in action.parameters if p.name == term), "object")
@@ -150,7 +151,7 @@ class Invariants:
         return domain
 
     def unbalanced(self, parts: Sequence[Part]) -> list[Part] | None:
-        """Return None if every action preserves the invariant; otherwise return parts whose addition might repair the invariant."""
+        """Return None if every action preserves the invariant; otherwise return parts that might be added to repair it."""
         of = {part.predicate: part for part in parts}
         for name, action in self.pddl.actions.items():
             effects = self.effects[name]

@@ -103,7 +103,7 @@ class Scope:
 
 @dataclass(frozen=True)
 class Cell:
-    """The symbol that an effect changes: its arguments, the new value, the condition, and the condition's own variables."""
+    """An effect on one symbol: the symbol's arguments, the new value, the effect's condition, and the condition's own variables."""
 
     own: tuple[Term, ...]
     when: Formula
@@ -315,7 +315,8 @@ class Lowering:
     def cost(self, behavior: Behavior, terms: Terms, scope: Scope) -> Number:
         """Return the cost of an action, and add the precondition that the cost is a number of at least 0.
 
-        A static predicate states that the numbers exist, because planners with action costs needn't support numeric comparisons.
+        A static predicate expresses that the numbers exist, since not every planner with action costs supports numeric
+        comparisons.
         """
         if behavior.price is None:
             return Fraction(repr(float(behavior.cost)))
@@ -341,7 +342,7 @@ class Lowering:
     # ---------------------------------------------------------------------------------------------------- effects
 
     def cell(self, effect: ValueEffect | AmountEffect, terms: Terms, scope: Scope) -> tuple[Cell, Terms]:
-        """Return the symbol that an effect changes, and the terms of the effect."""
+        """Return the symbol that an effect changes, and a mapping of the effect's variables to PDDL terms."""
         own, inside = self.bound(effect.when, terms, scope)
         its = self.words.terms(effect.arguments, inside)
         when = [self.words.guard(inside[name], scope.kinds[name]) for name in own]
@@ -418,8 +419,8 @@ class Lowering:
     def amount_changes(self, behavior: Behavior, terms: Terms, scope: Scope) -> Iterator[ConditionalEffect]:
         """Yield the PDDL effects of a behaviour on amounts, and add preconditions that their results are numbers within bounds.
 
-        A multiplication or assignment and a later increase of the same amount become one assignment, because planners don't apply
-        several such effects in sequence.
+        If an amount is multiplied or assigned and then increased, both effects become one assignment, because planners don't
+        apply several such effects in sequence.
         """
         groups: dict[tuple[str, FunctionTerm, Formula, tuple[Term, ...]], list[tuple[str, Number, bool]]] = {}
         for effect in behavior.amounts:
@@ -451,10 +452,10 @@ class Lowering:
                 yield ConditionalEffect(Assignment("assign", at, result), when, own)
 
     def within_bounds(self, scope: Scope) -> Iterator[Formula]:
-        """Yield the formulas that all totals are within their bounds.
+        """Yield the formulas which state that all totals are within their bounds.
 
-        The formulas are preconditions of every action and part of the goal. A state in which a total is out of bounds is
-        therefore a dead end.
+        The bounds of totals are preconditions of every action, and a part of the goal. A state in which a total is out of its
+        bounds is therefore a dead end.
         """
         for situation in self.totals:
             kind = self.words.situations[situation]
@@ -466,7 +467,7 @@ class Lowering:
                     yield no(some(own, both([*its, outside])))
 
     def check_whole(self, behavior: Behavior, effect: AmountEffect) -> None:
-        """Raise `KnowledgeError` if an effect may give a fraction to an amount of whole numbers, which PDDL can't restrict."""
+        """Raise `KnowledgeError` if an effect may give a fraction to an amount of whole numbers, since PDDL can't prevent this."""
         situations = self.words.situations
         quantity = situations[effect.situation].quantity
         if quantity is None or not quantity.whole:

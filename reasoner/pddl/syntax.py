@@ -2,7 +2,8 @@
 
 The supported subset contains types, constants, predicates, functions, actions with conditional and quantified effects, durative
 actions, derived predicates, action costs, timed initial literals, goal preferences, and the constraints ``always``, ``sometime``,
-``sometime-before`` and ``at-most-once``. Other constructs are rejected by name. Every error states file, line and column.
+``sometime-before`` and ``at-most-once``. Other constructs are rejected by an error that names the construct. Every error states
+file, line and column.
 
 The parser of unified-planning isn't used, because that parser reports an undefined type as a ``KeyError`` without a message,
 states no position for half of the errors, and takes .2 to .5 s for problems that this parser reads in 2 ms.
@@ -31,7 +32,7 @@ SECTIONS = {
 }
 
 EARLIER = {"sometime": 2, "sometime-before": 3, "at-most-once": 2}
-"""Constraints that concern several states of a plan, each with the number of items in its form."""
+"""The constraints that concern several states of a plan, each with the number of items in its PDDL expression."""
 
 
 def parse_files(domain: Path, problem: Path) -> Pddl:
@@ -84,7 +85,7 @@ class _Reader:
         return item
 
     def define(self, form: Form, kind: str) -> Iterator[Form]:
-        """Store the name in ``(define (kind name) section …)``, and yield the sections."""
+        """Store the name that ``(define (kind name) section …)`` defines, and yield the sections."""
         if form.head != "define" or len(form.items) < 2 or not isinstance(form.items[1], Form):
             raise self.fail(form, f"wanted (define ({kind} …) …)")
         title = form.items[1]
@@ -215,7 +216,7 @@ class _Reader:
         return [*found, *(Typed(name.text, "object", name) for name in waiting)]
 
     def kind(self, item: Word | Form, declaring: bool) -> str:
-        """Return the name of a type; for ``(either a b)``, declare a common supertype of `a` and `b` and return its name."""
+        """Return the name of a type. For ``(either a b)``, declare a common supertype of `a` and `b`, and return its name."""
         if isinstance(item, Form):
             words = [self.word(one, "a type") for one in item.items[1:]]
             if item.head != "either" or not words:
@@ -233,7 +234,7 @@ class _Reader:
         return item.text
 
     def types(self, items: Sequence[Word | Form]) -> None:
-        """Parse type declarations; a type that is declared twice or with ``either`` has several supertypes."""
+        """Parse type declarations. A type that is declared twice, or with ``either``, has several supertypes."""
         declared = self.typed(items, declaring=True)
         for one in declared:
             if one.name != "object":
@@ -246,7 +247,7 @@ class _Reader:
                 raise self.fail(one.place, f"type '{one.name}' is above itself")
 
     def objects(self, items: Sequence[Word | Form]) -> None:
-        """Parse object declarations; an object that is declared with two types has the subtype."""
+        """Parse object declarations. If an object is declared with a type and with its subtype, the object has the subtype."""
         for one in self.typed(items):
             known = self.pddl.objects.get(one.name, one.type)
             if one.type not in self.pddl.above(known) and known not in self.pddl.above(one.type):
@@ -353,9 +354,9 @@ class _Reader:
     def constraints(self, parts: Sequence[Word | Form], each: Sequence[Form] = ()) -> None:
         """Parse constraints on all states of a plan, also inside ``and`` and ``forall``.
 
-        A constraint becomes a derived predicate that is true if the constraint is violated, and that must never be true. The
-        constraints about earlier states read predicates that remember whether other derived predicates have held. ``sometime``
-        becomes a goal.
+        A constraint becomes a derived predicate that is true if the constraint is violated, and that must never be true. For
+        constraints about earlier states, additional predicates remember whether other derived predicates have been true. A
+        constraint ``sometime`` becomes a goal.
         """
         for part in parts:
             head = part.head if isinstance(part, Form) else ""
@@ -410,7 +411,7 @@ class _Reader:
         return atom
 
     def remember(self, name: str, source: Form, typed: tuple[Typed, ...]) -> Form:
-        """Add a predicate that becomes true when an atom becomes true, and stays true; return the atom of the predicate."""
+        """Add a predicate that becomes true when a given atom becomes true, and stays true; return the atom of the predicate."""
         atom = self.declare(name, typed)
         self.pddl.remembers[atom.head] = source.head
         return atom
@@ -538,7 +539,7 @@ class _Reader:
         known: Mapping[str, tuple[Typed, ...]] | None = None,
         what: str = "predicate",
     ) -> tuple[str, ...]:
-        """Check ``(name term …)`` against the declaration of the predicate or function, and return its words."""
+        """Check an atom ``(name term …)`` against the declaration of its predicate or function, and return the atom's words."""
         known = self.pddl.predicates if known is None else known
         if not form.head:
             raise self.fail(form, f"wanted a {what}, got a list")
@@ -612,5 +613,5 @@ class _Reader:
 
 
 def _formed(at: Form, head: str, *items: Word | Form) -> Form:
-    """Return a form with a head, at the position of another form."""
+    """Return a form (a list of PDDL) with a given first word, at the position of another form."""
     return Form((Word(head, at.line, at.column), *items), at.line, at.column)

@@ -95,11 +95,11 @@ def timing(table: Table, parts: Durative, variables: Variables, conditions: Sequ
 
 
 def snapped(pddl: Pddl, effects: Mapping[str, Sequence[Effect]]) -> tuple[Pddl, dict[str, tuple[Effect, ...]]]:
-    """Return a domain in which two actions, the start and the end, replace each durative action; and the effects of all actions.
+    """Return a domain in which a start action and an end action replace each durative action, and the effects of all actions.
 
-    Invariant synthesis uses this domain. The synthesis accepts a deletion if the same action requires the deleted fact. If the
-    start of an action adds no fact, its deletions and their conditions are moved to the end, which may add another fact in place
-    of a deleted fact.
+    Invariant synthesis works on the returned domain. The synthesis recognises a deletion only if the same action requires the
+    deleted fact. If the start of an action adds no fact, its deletions and their conditions are moved to the end, which may add
+    another fact in place of a deleted fact.
     """
     actions: dict[str, Action] = {}
     found: dict[str, tuple[Effect, ...]] = {}
@@ -136,7 +136,11 @@ def _all(forms: Sequence[Form], place: Word) -> Form | None:
 def happenings(
     table: Table, variables: Variables, situations: dict[str, SituationType], classes: dict[str, tuple[str, ...]]
 ) -> tuple[list[Behavior], dict[Symbol, str], Times | None]:
-    """Return the behaviours for timed initial literals in order of time, the goal that the last one has happened, and the times."""
+    """Return the behaviours for timed initial literals, a goal, and the times of the behaviours.
+
+    The behaviours are in the order of their times. The goal for timed initial literals states that the last of their behaviours
+    has happened.
+    """
     pddl = table.pddl
     moments = sorted({time for time, _, _ in pddl.timed})
     if not moments:

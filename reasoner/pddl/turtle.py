@@ -54,8 +54,8 @@ CORE_CLASSES = ("Object", "Truth", "Hand", "Robot")
 Said = Mapping[str, str]
 """Mapping from names to labels, for example to the original PDDL names."""
 _Stated: TypeAlias = "tuple[str, str, str, Properties]"
-"""A fact: its subject, its value property (or an empty text), its value, and, without a value property, the properties of its
-node.
+"""A fact: its subject, its value property (or an empty text), its value, and the properties of its node. Only a fact without a
+value property has a node.
 """
 
 
@@ -67,9 +67,9 @@ def turtle(problem: Problem, title: str, description: str, labels: Said | None =
     problem : Problem
         The problem, whose names become local names of IRIs in the namespace of the scene.
     title, description : str
-        Annotations of the scene.
+        The title and the description of the scene.
     labels : mapping of name to label, optional
-        A name without an entry is its own label.
+        The labels of names; a name without an entry is its own label.
     """
     writer = _SceneWriter(problem, dict(labels or {}))
     header = HEADER.format(scene=problem.scene, title=_quoted(title), description=_quoted(description))
@@ -276,7 +276,7 @@ class _SceneWriter:
     def behavior_nodes(self, where: str, terms: Iterable[Parameter]) -> NodeWriter:
         """Return a writer of the conditions and effects of a behaviour or rule.
 
-        The names of all nodes begin with its name `where`.
+        The names of all nodes begin with the name `where` of the behaviour or rule.
         """
         taken = {t.name: f":{where}.{t.name[1:]}" for t in terms}
         sought = set(taken.values())
@@ -326,7 +326,10 @@ class _SceneWriter:
             yield from self.above(parent)
 
     def facts(self) -> Iterator[str]:
-        """Yield the initial facts, as statements of a value property if one exists and as nodes otherwise."""
+        """Yield the initial facts.
+
+        A fact is written as a statement of a value property if the property exists, and as a node otherwise.
+        """
         number = 0
         for subject, prop, value, properties in (*self.values(), *self.tuples()):
             if prop:
@@ -389,7 +392,10 @@ class _SceneWriter:
 
 
 def _spanned(nodes: NodeWriter, iri: str, span: Span) -> str:
-    """Return the IRI of a condition or effect. Its time span is stated unless the span is the whole duration."""
+    """Return the IRI of a condition or effect.
+
+    The time span of the condition or effect is stated, unless it is the whole duration.
+    """
     if span is not Span.THROUGHOUT:
         nodes.nodes.append(f"{iri} c:during c:{span.value}")
     return iri

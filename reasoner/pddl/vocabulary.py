@@ -28,7 +28,8 @@ sometime sometime-after sometime-before start total-cost total-time types undefi
 class Vocabulary:
     """Mapping from the names of a problem to PDDL names.
 
-    All PDDL names are different, even those of a type and an object, because some parsers have one table for all names.
+    All PDDL names are different: even a type and an object have different names, because some parsers have one table for all
+    names.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -49,7 +50,7 @@ class Vocabulary:
         self.lowest = {member: self.types[kind] for kind in self.above_first() for member in problem.members(kind)}
 
     def name(self, kind: str, ours: str, wanted: str | None = None) -> str:
-        """Return the PDDL name for a name of the given kind in the scene."""
+        """Return the PDDL name for a name in the scene, given the kind of the name."""
         if (kind, ours) not in self.names:
             text = re.sub(r"[^0-9a-z_-]", "_", (wanted or ours).lower())
             text = text if re.match(r"[a-z]", text) else f"x{text}"
@@ -105,19 +106,19 @@ class Vocabulary:
         return Atom(predicate, tuple(terms))
 
     def about(self, situation: str, terms: Sequence[Term]) -> tuple[Term, ...]:
-        """Return the arguments of a symbol, except the individual for the world."""
+        """Return the arguments of a symbol, except the individual that stands for the world."""
         kinds = self.situations[situation].arguments
         one = len(self.problem.classes.get(WORLD, ())) == 1
         return tuple(term for kind, term in zip(kinds, terms, strict=True) if not (one and kind == WORLD))
 
     def value(self, situation: str, terms: Sequence[Term], value: Term | None) -> Atom:
-        """Return the atom that a symbol has a value, or the atom that a boolean symbol is true if `value` is None."""
+        """Return the atom which states that a symbol has a value or, if `value` is None, that a boolean symbol is true."""
         self.used[situation] = None
         words = self.about(situation, terms)
         return self.atom(self.name("predicate", situation), words if value is None else (*words, value))
 
     def is_a(self, term: Term, kind: str) -> Formula:
-        """Return the formula that a term denotes a member of a class; the formula is constant if its truth is known."""
+        """Return the formula for membership of a term in a class; the formula is constant if its truth is known."""
         members = self.problem.members(kind)
         if term.members <= members:
             return ALWAYS
@@ -126,19 +127,19 @@ class Vocabulary:
         return self.static(f"is {kind}", f"is_{kind}", frozenset((member,) for member in members), (term,))
 
     def guard(self, term: Term, kind: str) -> Formula:
-        """Return the formula that a variable denotes a member of its class; the formula is constant if the class is a PDDL type."""
+        """Return the formula for membership of a variable in its class; the formula is constant if the class is a PDDL type."""
         if kind in self.types:
             return ALWAYS
         return self.static(f"is {kind}", f"is_{kind}", frozenset((one,) for one in self.problem.members(kind)), (term,))
 
     def relation(self, relation: str, terms: Sequence[Term]) -> Formula:
-        """Return the formula that a static relation holds for some terms."""
+        """Return the formula which states that a static relation holds for some terms."""
         return self.static(f"relation {relation}", relation, self.problem.relations.get(relation, frozenset()), terms)
 
     def differs(self, term: Term, constant: Term) -> Formula:
-        """Return the formula that a term doesn't denote a given individual.
+        """Return the formula which states that a term doesn't denote a given individual.
 
-        The formula uses a predicate instead of PDDL's equality.
+        The formula for "different from an individual" uses a predicate instead of PDDL's equality.
         """
         rows = frozenset((one, other) for one in term.members for other in constant.members - {one})
         found = self.static(
@@ -147,7 +148,7 @@ class Vocabulary:
         return found if term.members & constant.members else ALWAYS
 
     def static(self, ours: str, wanted: str, rows: frozenset[tuple[str, ...]], terms: Sequence[Term]) -> Formula:
-        """Return the atom of a static predicate with the given rows; return a constant formula if its truth is known."""
+        """Return the atom of a static predicate with the given rows, or a constant formula if the truth of the atom is known."""
         if not rows:
             return NEVER
         if not any(term.variable for term in terms):
@@ -168,14 +169,14 @@ class Vocabulary:
         return all(row in rows for row in product(*(sorted(term.members) for term in terms)))
 
     def symbols(self, situation: str) -> int:
-        """Return the maximum number of symbols of a situation type, one for each combination of its argument classes' members."""
+        """Return the maximum number of symbols of a situation type: the product of the sizes of its argument classes."""
         number = 1
         for kind in self.situations[situation].arguments:
             number *= len(self.problem.classes.get(kind, ()))
         return number
 
     def exists(self, situation: str, terms: Sequence[Term]) -> Formula:
-        """Return the formula that the symbol of a situation type exists for some terms."""
+        """Return the formula which states that the symbol of a situation type exists for some terms."""
         kind = self.situations[situation]
         if self.total(situation, terms):
             return ALWAYS
@@ -228,7 +229,7 @@ class Vocabulary:
                 return expression
 
     def there(self, expression: Expression, terms: Mapping[str, Term]) -> Iterator[Formula]:
-        """Yield the formulas that all amounts and measures in a numeric expression exist."""
+        """Yield the formulas which state that all amounts and measures in a numeric expression exist."""
         match expression:
             case Amount(situation, arguments):
                 yield self.exists(situation, self.terms(arguments, terms))

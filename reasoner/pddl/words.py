@@ -29,7 +29,7 @@ class Form:
 
     @property
     def head(self) -> str:
-        """The first item if it is a word, otherwise an empty text."""
+        """The first item of the list if the item is a word, otherwise an empty text."""
         return self.items[0].text if self.items and isinstance(self.items[0], Word) else ""
 
 
@@ -38,7 +38,7 @@ class PddlError(ValueError):
 
 
 def form_of(text: str, file: str) -> Form:
-    """Return the single list that a PDDL text consists of."""
+    """Parse a PDDL text, which must consist of a single list, and return this list."""
     stack: list[tuple[list[Word | Form], int, int]] = []
     line, start = 1, 0
     done: Form | None = None

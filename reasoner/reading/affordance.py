@@ -1,7 +1,7 @@
 """Situated affordances: the behaviours that each object affords in a state, found by SPARQL.
 
 A state is written into a separate named graph (`SITUATION`) with one fact for each symbol, including default values. The
-preconditions of a behaviour become graph patterns:
+preconditions of a behaviour become SPARQL graph patterns:
 
 =========================  ===================================================================
 condition                  pattern
@@ -58,7 +58,7 @@ RELATION_PROPERTIES = (
 TYPE = ox.NamedNode(RDF + "type")
 SIGNS = {"increase": "+", "decrease": "-"}
 MOST_TOGETHER = 3
-"""Maximum number of other effects on the same amount for which the query tests the amount's bounds."""
+"""The query tests the bounds of an amount only if at most this many other effects change the same amount."""
 
 
 @dataclass(frozen=True, order=True)
@@ -106,7 +106,7 @@ def write_situation(graph: KnowledgeGraph, reading: Reading, state: State | None
 
 
 def _following(graph: KnowledgeGraph, reading: Reading) -> Iterator[Symbol]:
-    """Yield the derived facts of the graph `SITUATION`, in order of derivation.
+    """Yield the facts that follow from the graph `SITUATION`, in the order of derivation.
 
     The caller must add each fact to the graph before the caller requests the next fact.
     """
@@ -126,7 +126,7 @@ def _following(graph: KnowledgeGraph, reading: Reading) -> Iterator[Symbol]:
 
 
 def _names(condition: Condition, variable: str) -> bool:
-    """Return whether a true condition binds a variable."""
+    """Return whether a condition, if true, determines the value of a variable."""
     match condition:
         case ValueCondition(_, arguments, value, False) if value != FALSE:
             return variable in (*arguments, value)
@@ -141,7 +141,7 @@ def applicable_query(
 ) -> str:
     """Return the SPARQL query for the arguments and variable bindings with which a behaviour is applicable.
 
-    The query reads the graph `SITUATION`, which `write_situation` fills. `when` contains conditions in addition to the
+    The query reads the graph `SITUATION`, which `write_situation` fills. `when` contains further conditions, in addition to the
     preconditions.
     """
     return _Writer(graph, reading).query(behavior, when)
@@ -257,7 +257,7 @@ class _Writer:
                     yield _fact(effect, row)
 
     def names(self, behavior: Behavior, when: Sequence[Condition]) -> list[str]:
-        """Return the variables that a query binds: the parameters in order, then the variables that value conditions determine."""
+        """Return the variables that a query binds: the parameters in order, then the variables determined by value conditions."""
         found = dict.fromkeys(parameter.name for parameter in behavior.parameters)
         for condition in (*behavior.preconditions, *when):
             if isinstance(condition, ValueCondition) and not condition.negated and condition.value.startswith("?"):

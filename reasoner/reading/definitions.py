@@ -1,8 +1,8 @@
 """Compilation of classes that are defined by situations into conditions.
 
-The members of a class such as "a full vessel is a vessel that carries some beverage" change during a plan. The OWL
-reasoner must not infer these members before planning. In a behaviour, the conditions of the definition replace such a
-class:
+The members of a class such as "a full vessel is a vessel that carries some beverage" change during a plan. The OWL reasoner must
+not infer members that change during a plan. In a behaviour, the conditions of its definition replace a class that is defined by
+situations:
 
 =========================================  =======================================================
 in OWL                                      in `confab.reasoner.symbols`
@@ -85,8 +85,9 @@ _DEFINED = OWL + "equivalentClass"
 CLOSED = {OWL + name for name in ("complementOf", "allValuesFrom", "oneOf", "hasSelf")}
 CLOSED |= {OWL + name for name in ("cardinality", "minCardinality", "maxCardinality")}
 CLOSED |= {OWL + name for name in ("qualifiedCardinality", "minQualifiedCardinality", "maxQualifiedCardinality")}
-"""OWL constructs from which OWL 2 RL infers no members; planning infers such members, because planning treats unstated
-facts as false."""
+"""OWL constructs from which OWL 2 RL infers no members of a class. Planning infers the members of classes with these constructs,
+because planning treats unstated facts as false.
+"""
 MOST = 5
 """Maximum cardinality in a definition; the evaluation of larger cardinalities would take longer than planning."""
 FACETS = {"minInclusive": ">=", "minExclusive": ">", "maxInclusive": "<=", "maxExclusive": "<"}
@@ -104,8 +105,9 @@ class Definitions:
     numbers : set of properties whose values are numbers
     kinds : mapping of property to its domain and range as class names; an empty text for an unstated class
     concluded : mapping of class to situation type and owner
-        Classes whose members follow from rules, from SWRL or from a recursive definition. The situation type is true for the
-        members; the owner is the class that has the situation type, or an empty text if several classes have it.
+        The classes whose members follow from rules: from SWRL rules, or from a recursive definition. For each class: the
+        situation type that is true for the members, and its owner. The owner is the class that has the situation type, or an
+        empty text if several classes have the situation type.
     """
 
     nodes: Mapping[str, Mapping[str, Sequence[str]]]
@@ -116,7 +118,7 @@ class Definitions:
     concluded: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
     def changes(self, iri: str) -> bool:
-        """Return whether conditions are used instead of a class: its members change, or OWL 2 RL doesn't find all members."""
+        """Return whether conditions replace a class: its members change, or OWL 2 RL doesn't find all of its members."""
         return iri in self._changing
 
     @cached_property
@@ -155,7 +157,7 @@ class Definitions:
     def _closed(self) -> frozenset[str]:
         """The classes whose members OWL 2 RL can't infer because their definitions contain `CLOSED` constructs.
 
-        A definition is included only if the definition has the form *Base and …* with known properties.
+        A class is included only if its definition has the form *Base and …* with known properties.
         """
         known = self.situations.keys() | self.kinds.keys() | self.numbers
         found = set()
@@ -230,7 +232,10 @@ class Definitions:
         return (_negation(found),) if negated else found
 
     def holding(self, term: str, iri: str) -> tuple[Condition, ...]:
-        """Return the conditions for a situation type that is true for the members of a class, without the type's own rules."""
+        """Return the conditions for membership in a class, for a situation type that is true for the members.
+
+        The rules of the situation type itself aren't used.
+        """
         if iri not in self.concluded:
             return self.conditions(term, iri)
         if self._definitions(iri):
@@ -243,7 +248,7 @@ class Definitions:
         return found[0] if len(found) == 1 else AnyOf((found,))
 
     def beyond_base(self, term: str, iri: str) -> tuple[Condition, ...]:
-        """Return the conditions of a changing class on a term of its base class; return no conditions for a static class."""
+        """Return the conditions under which a member of the base class belongs to a changing class; none for a static class."""
         return self.conditions(term, iri) if self.changes(iri) else ()
 
     def _one_definition(self, iri: str) -> str:
@@ -259,8 +264,8 @@ class Definitions:
     def rules(self, prop: str, situation: str, kinds: Sequence[str], more: bool = False) -> list[Rule]:
         """Return the rules that follow from the axioms about a value property: subproperties, chains, inverses and characteristics.
 
-        A transitive property is derived from its other rules by adding one link at a time. `more` states whether the situation type
-        has rules that don't follow from axioms.
+        The rule of a transitive property adds one link at a time to the pairs that the other rules derive. `more` states whether
+        the situation type has rules that don't follow from axioms.
         """
         said = self.nodes.get(prop, {})
         ways: list[tuple[str, ...]] = [(other,) for other in self._below(prop)]
@@ -318,7 +323,7 @@ class Definitions:
         return Rule(situation, (Parameter("?from", kinds[0]), Parameter("?to", kinds[1])), variables, conditions)
 
     def _between(self, one: str, other: str) -> str:
-        """Return the class of the individuals that join two properties of a chain."""
+        """Return the class of the individuals between two properties of a chain: values of the first, subjects of the second."""
         for prop, at_its_end in ((one, True), (other, False)):
             iri, inverse = self._named(prop)
             if kind := self.kinds.get(iri, ("", ""))[at_its_end is not inverse]:
@@ -367,7 +372,7 @@ class Definitions:
 
     @staticmethod
     def _cardinality(said: Mapping[str, Sequence[str]]) -> tuple[int, int | None] | None:
-        """Return the minimum and maximum (None if unbounded) of a cardinality restriction; None for other restrictions."""
+        """Return the minimum and maximum (None if unbounded) of a cardinality restriction; return None for other restrictions."""
         for name in ("cardinality", "qualifiedCardinality"):
             capital = name[0].upper() + name[1:]
             found = [said.get(OWL + one, [""])[0] for one in (name, f"min{capital}", f"max{capital}")]
@@ -408,7 +413,7 @@ class Definitions:
         )
 
     def _data_range(self, prop: str, amount: Expression, node: str) -> tuple[Condition, ...]:
-        """Return conditions whose conjunction is equivalent to an amount being in a data range."""
+        """Return conditions whose conjunction states that an amount is in a data range."""
         said = self.nodes.get(node, {})
         if not said:
             return (Comparison(amount, "=", amount),)  # a datatype allows every number
@@ -451,9 +456,9 @@ class Definitions:
     def _some(
         self, prop: str, term: str, filler: str, outside: bool, others: int = 0, before: tuple[str, ...] = ()
     ) -> Witness:
-        """Return the condition that a term has a value in a class, and `others` further different values in the class.
+        """Return the condition that a term has a value in a class, and `others` further values in the class, all different.
 
-        If `outside`, return the condition that no value of the term is outside the class.
+        If `outside` is true, return the condition that no value of the term is outside the class.
         """
         variable = f"{term if term.startswith('?') else '?' + term}_{local_name(self._named(prop)[0])}"
         variable += str(len(before) + 1) if before else ""

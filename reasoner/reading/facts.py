@@ -88,12 +88,12 @@ def facts_of(
 
 
 def individuals_named(domain: Domain, names: Names) -> dict[str, int]:
-    """Return the number of individuals in each static relation according to behaviours and rules.
+    """Return the number of individuals in a row of each static relation, according to behaviours and rules.
 
     Raises
     ------
     KnowledgeError
-        Two conditions or calculations have different numbers of individuals for the same relation.
+        Two conditions or calculations use the same relation with different numbers of individuals.
     """
     found: dict[str, tuple[int, str]] = {}
     rules = [rule.behavior for its in domain.rules.values() for rule in its]
@@ -128,7 +128,7 @@ def initial_state(
 ) -> dict[Symbol, str]:
     """Return the initial value of each symbol: the stated value, or the situation type's default.
 
-    Raise `KnowledgeError` if a symbol has several stated values, or neither a stated value nor a default.
+    Raise `KnowledgeError` if a symbol has several stated values, or has no stated value and no default.
     """
     initial = {}
     for situation in domain.situations.values():

@@ -62,7 +62,7 @@ class _Whole(Names):
 
 
 def as_written(schema: Schema, behaviors: Iterable[str]) -> dict[str, Behavior]:
-    """Return the given behaviours, with IRIs as names and with classes that aren't replaced by their definitions."""
+    """Return the given behaviours as written: names are IRIs, and classes aren't replaced by their definitions."""
     names = _Whole(())
     terms = set(schema.of_kind("Parameter", "Variable"))
     parts = Parts(schema.nodes, names, terms, set(schema.pairs), Definitions({}, {}, names), schema.individuals_of)
@@ -98,11 +98,11 @@ def frame(
     namesakes: Collection[str] = (),
     earlier: Frame | None = None,
 ) -> Frame:
-    """Return the domain of a schema, and the classes of some individuals.
+    """Return the domain that a schema describes, together with the classes of some individuals.
 
-    `namesakes` are IRIs of unread individuals with the same local names, so that names are unique in the whole scene.
-    `earlier` is a frame of fewer individuals; the behaviours of this frame are reused unless a name in a behaviour has
-    changed.
+    `namesakes` are the IRIs of individuals that weren't read but have the same local names; short names are therefore unique in
+    the whole scene. `earlier` is a frame of fewer individuals; the behaviours of this frame are reused unless a name in a
+    behaviour has changed.
     """
     nodes, supers = schema.nodes, schema.supers
     instances = [(individual, kind, index) for individual, kind, index in members if individual not in nodes]
@@ -173,7 +173,7 @@ def _rules(parts: Parts, schema: Schema, situations: Mapping[str, SituationType]
     Raises
     ------
     KnowledgeError
-        A behaviour changes a derived situation type. Or a derived situation type isn't boolean, or depends on its own negation.
+        A derived situation type is changed by a behaviour, isn't boolean, or depends on its own negation.
     """
     changed = {
         parts.one(iri, "situationType") for iri in schema.of_kind("ValueEffect") if parts.values(iri, "situationType")
@@ -247,7 +247,7 @@ def _aggregates(
     Raises
     ------
     KnowledgeError
-        A behaviour changes a derived amount, or a derived amount has two rules, isn't an amount, or depends on itself.
+        A derived amount is changed by a behaviour, has two rules, isn't declared as an amount, or depends on itself.
     """
     found: dict[str, Aggregate] = {}
     for iri in schema.of_kind("Rule"):
@@ -371,7 +371,8 @@ def _value_properties(schema: Schema) -> dict[str, tuple[str, bool]]:
 def _check_behavior(behavior: Behavior, domain: Domain) -> None:
     """Raise `KnowledgeError` if a behaviour is faulty.
 
-    Two terms have equal names, a number of arguments is wrong, or a situation type doesn't exist on the behaviour's level.
+    A fault is two terms with equal names, a wrong number of arguments, or a situation type that doesn't exist on the behaviour's
+    level.
     """
     names = [term.name for term in (*behavior.parameters, *behavior.variables)]
     if twice := sorted({name[1:] for name in names if names.count(name) > 1}):
@@ -406,9 +407,9 @@ def _check_behavior(behavior: Behavior, domain: Domain) -> None:
 def _situations(
     schema: Parts, read: Schema, classes: dict[str, tuple[str, ...]]
 ) -> tuple[list[SituationType], dict[str, tuple[str, bool]]]:
-    """Return the sorted situation types.
+    """Return the sorted situation types, and a mapping of each value property to its situation type.
 
-    Also return, for each value property, its situation type and whether this type is boolean.
+    The mapping also tells whether the type is boolean.
     """
     found, properties = [], {}
     for iri in sorted(read.of_kind("SituationType"), key=schema.names.short):

@@ -39,13 +39,13 @@ from confab.reasoner.symbols import (
 )
 
 TASK = "Task"
-"""Class of the individual that is the argument of a goal's derived situation type."""
+"""The class of tasks; the argument of a goal's derived situation type is a task."""
 BOUNDS = re.compile(rf"((<=?|>=?|=)?{DECIMAL.pattern})(,(<=?|>=?|=)?{DECIMAL.pattern})*")
 """Notation of a number or bounds in a goal on an amount."""
 
 
 def with_goals(problem: Problem, goals: Iterable[str]) -> Problem:
-    """Return a problem with the given goals, such as ``cup2 LOCATION location8``, instead of the task's goals on these symbols.
+    """Return a problem in which goals such as ``cup2 LOCATION location8`` replace the task's goals for the same symbols.
 
     Raises
     ------
@@ -126,7 +126,7 @@ def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
 def _with_situation(problem: Problem, words: Sequence[str]) -> str:
     """Return a hint to the only situation type that fits two words, or an empty text.
 
-    A type fits if the first word can be its object and the last word its value.
+    A situation type fits if the first word can be its object and the last word can be its value.
     """
     about, value = (words[0], words[-1]) if words else ("", "")
     found = [
@@ -215,7 +215,8 @@ def with_derived_goal(problem: Problem, task: str, name: str, wanted: Condition)
 
     The symbol is true if the condition `wanted` holds.
 
-    The argument of the symbol is the task. A goal with alternatives or quantifiers thereby becomes a fact like other goals.
+    The argument of the symbol for the goal is the task. A derived situation type turns a goal with alternatives or quantifiers
+    into a fact like other goals.
     """
     domain = problem.domain
     names = [name, *(f"{name}_{number}" for number in range(2, len(domain.situations) + 3))]
@@ -235,12 +236,12 @@ def with_derived_goal(problem: Problem, task: str, name: str, wanted: Condition)
 def _wanted_value(iri: str, symbol: Symbol, wanted: ValueCondition, problem: Problem) -> str:
     """Return the wanted value of a goal.
 
-    For a negated goal, this is the only other value of the symbol on the lowest level that has the symbol.
+    The wanted value of a negated goal is the only other value of the symbol on the lowest level that has the symbol.
 
     Raises
     ------
     KnowledgeError
-        The symbol has several other values.
+        The goal is negated, and its symbol has several other values.
     """
     if not wanted.negated:
         return wanted.value
@@ -283,7 +284,7 @@ def _wanted(parts: Parts, iri: str, classes: Mapping[str, tuple[str, ...]]) -> l
 
 
 def _bounds(iri: str, wanted: Comparison) -> tuple[Symbol, str]:
-    """Return the symbol and the bounds of a goal on an amount."""
+    """Return the symbol and the bounds of a goal that concerns an amount."""
     contrary = {"<": ">=", "<=": ">", ">=": "<", ">": "<="}
     sign = contrary.get(wanted.operator, "") if wanted.negated else wanted.operator
     if not sign or not isinstance(wanted.left, Amount) or not isinstance(wanted.right, Fraction):

@@ -28,7 +28,7 @@ class Individuals:
     Attributes
     ----------
     triples : ordered set of triples
-        All facts about the individuals in `seen`, and the facts about other individuals that were found by their values.
+        All facts about the individuals in `seen`, and facts about other individuals that searches by values found.
     seen : set of individuals
     """
 

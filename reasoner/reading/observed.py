@@ -1,8 +1,8 @@
 """Observed facts of a scene, stored in a separate file.
 
-Each observed fact is a situated object instance: a node that states an object, a situation type and a value. Property assertions
-aren't used, because the observed place of a cup would contradict the cup's place in the scene. A planning call that starts from
-observations replaces the scene's values by the observed values.
+Each observed fact is a situated object instance: a node that states an object, a situation type and a value. An observation isn't
+stored as a property assertion: the observed place of a cup would contradict the cup's place in the scene. A planning call that
+starts from observations replaces the scene's values by the observed values.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def assert_observed(graph: KnowledgeGraph, state: State, names: Names) -> None:
 
 
 def load_observed(path: Path, reading: Reading) -> Reading:
-    """Return a reading with the observed facts of a file instead of the scene's facts in the initial state.
+    """Return a reading whose initial state has the observed facts of a file in place of the scene's facts.
 
     Raises
     ------

@@ -112,7 +112,10 @@ class Parts(NodeReader):
         return Parameter(self.term(iri), self.names.short(self.definitions.base(self.one(iri, "termType"))))
 
     def sought(self, iri: str) -> tuple[Parameter, tuple[Condition, ...]]:
-        """Return the variable of a witness. If its class is defined by situations, also return the conditions of the definition."""
+        """Return the variable of a witness.
+
+        If the class of the variable is defined by situations, also return the conditions of the definition.
+        """
         return self.parameter(iri), self.membership(iri)
 
     def membership(self, iri: str) -> tuple[Condition, ...]:
@@ -162,7 +165,7 @@ class Parts(NodeReader):
         return found
 
     def classes_in(self, iri: str) -> list[str]:
-        """Return the classes among the arguments and the value of a node that stand for all of their members."""
+        """Return the arguments and the value of a node that are classes and stand for all members of the class."""
         said = [value for name in (*ARGUMENTS, "value") for value in self.values(iri, name)[:1]]
         found = [value for value in said if value in self.individuals_of and value not in self.standing]
         if twice := [kind for kind in found if found.count(kind) > 1]:
@@ -181,7 +184,7 @@ class Parts(NodeReader):
     def read(self, iri: str) -> Condition:
         """Return the condition of a node.
 
-        If a class stands for its members in the node, the condition must hold for every member.
+        If the node names a class in place of its members, the condition must hold for every member.
         """
         kinds = self.classes_in(iri)
         for kind in kinds:
@@ -202,7 +205,7 @@ class Parts(NodeReader):
         return Witness(anyone, self.names.short(self.definitions.base(kind)), inner, not self.flag(iri, "negated"))
 
     def effect(self, iri: str) -> Effect:
-        """Return the effect of a node; if a class stands for its members, the effect is on every member that satisfies `when`."""
+        """Return the effect of a node. If a class stands for its members, every member that satisfies `when` has the effect."""
         if iri not in self.nodes:
             raise KnowledgeError(f"<{iri}> is used as an effect but isn't declared as one")
         kinds = self.classes_in(iri)
@@ -299,7 +302,7 @@ class Parts(NodeReader):
     def rule(self, iri: str, kinds: Sequence[str]) -> Rule:
         """Return a rule.
 
-        If an individual is among its arguments, a new parameter with an equality condition replaces the individual.
+        If an individual is among the rule's arguments, a new parameter with an equality condition replaces the individual.
         """
         situation, arguments, value = self.symbol(iri)
         if value != TRUE:

@@ -1,7 +1,7 @@
 """Reading of planning problems from the knowledge graph.
 
-A few large queries read the graph. Their rows become nodes (`confab.reasoner.reading.rows`). The nodes become conditions, effects
-and behaviours (`confab.reasoner.reading.parts`) and goals (`confab.reasoner.reading.goals`) of a problem:
+A few large queries read the graph. The rows of their results become nodes (`confab.reasoner.reading.rows`). The nodes become
+conditions, effects and behaviours (`confab.reasoner.reading.parts`) and goals (`confab.reasoner.reading.goals`) of a problem:
 
 ============================  ==============================================
 in the ontology               in `confab.reasoner.symbols`
@@ -103,16 +103,16 @@ def _members(graph: KnowledgeGraph) -> list[Member]:
 def reading_of(
     scene: str, known: Frame, facts: Iterable[Triple], tuples: Mapping[str, Node], whole: bool = True
 ) -> Reading:
-    """Return the planning problem of the individuals in a frame.
+    """Return the planning problem with the individuals of a frame.
 
     Parameters
     ----------
     scene : str
     known : Frame
     facts : triples of IRIs
-        Facts of value properties and relations between the individuals.
+        The facts that value properties and relations state about the individuals.
     tuples : mapping of IRI to node
-        Facts that are nodes.
+        The facts that are stated as nodes.
     whole : bool
         Whether the frame contains all individuals of the scene.
     """

@@ -1,10 +1,10 @@
 """Quantification: a behaviour with parameters becomes a SPARQL query whose rows are the quantified behaviours.
 
-The query has one sub-select per parameter. A sub-select yields the individuals of the parameter's class. Quantified behaviours
-are numbered in the declared order of their behaviours, then by the declared order of the individuals for the first parameter,
-then for the second parameter, and so on (PAPER.md section 4). `quantify` calculates the IDs without an ORDER BY clause, which
-makes the query ten times as fast and lets a time limit stop the query. Applicability isn't tested: the number M in the paper
-counts all quantified behaviours.
+The query has one sub-select per parameter, which yields the individuals of the parameter's class. Quantified behaviours are
+numbered in the declared order of their behaviours, then by the declared order of the individuals for the first parameter, then
+for the second parameter, and so on (PAPER.md section 4). `quantify` calculates the IDs without an ORDER BY clause, which makes
+the query ten times as fast and lets a time limit stop the query. Applicability isn't tested: the number M in the paper counts all
+quantified behaviours.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def query_for(reading: Reading, behavior: Behavior, ordered: bool = True) -> str
     Raises
     ------
     KnowledgeError
-        The class of a parameter is a union of several classes, which has no IRI.
+        The class of a parameter has no IRI, because it is a union of several classes.
     """
     names = [parameter.name for parameter in behavior.parameters]
     order = " ".join(f"{name}_index STR({name})" for name in names) if ordered else ""

@@ -62,9 +62,9 @@ class Routes:
     """The properties (as IRIs) by which task recognition gets from relevant individuals to further relevant individuals.
 
     - `forward` contains the properties that are followed from subject to object.
-    - The keys of `backward` are the properties that are followed from object to subject. The values are the constants from which
-      a property is followed, too. A constant is a value that a behaviour names, such as "nothing"; many symbols may have this
-      value.
+    - The keys of `backward` are the properties that are followed from object to subject. The values are constants from which a
+      property is followed in addition. A constant is a value that a behaviour names, such as "nothing"; many symbols may have
+      this value.
     - `classes` contains the classes whose individuals are all relevant.
     """
 
@@ -85,7 +85,8 @@ def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
     Returns
     -------
     Reading
-        The result of `confab.reasoner.reading.problem.read` with fewer individuals. Behaviour IDs depend on these individuals.
+        The result of `confab.reasoner.reading.problem.read` with fewer individuals. The IDs of behaviours depend on the
+        individuals that are read.
 
     Raises
     ------
@@ -129,12 +130,12 @@ def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
     A behaviour is relevant if it changes a relevant situation type; a rule is relevant if it derives a relevant situation type.
     All situation types in conditions and effects of relevant behaviours and rules are relevant. If facts of a situation type are
     looked up by one of their terms, such as a place, an effect on such a fact may concern the slice. Routes therefore also lead
-    from this term of the effect to the behaviour's other terms.
+    from the corresponding term of the effect to the behaviour's other terms.
 
     Parameters
     ----------
     known : Frame
-        The frame of the constants.
+        The frame (domain and classes) that contains only the individuals that the ontology's behaviours and definitions name.
     more_situations : iterable of str
         Situation types that are relevant in addition to the situation types in the task's goals.
     """
@@ -179,7 +180,9 @@ def _span_to_totals(aggregate: Aggregate, changed: set[str], known: Frame, found
 
 
 LookedUp: TypeAlias = "dict[tuple[str, int], set[str]]"
-"""Maps each pair (situation type, position of a term) by which facts are looked up to the constants that the term may denote."""
+"""The positions of terms by which facts are looked up. A key is a situation type and a position; the value contains the constants
+that the term at this position may denote.
+"""
 
 
 class _Doing:
@@ -232,7 +235,7 @@ def _terms_in(effect: Effect) -> set[str]:
 
 
 def _given(effect: Effect, looked_up: LookedUp) -> Iterator[frozenset[str]]:
-    """Yield each term of an effect by which its fact may be looked up."""
+    """Yield each term of an effect by which the changed fact may be looked up."""
     if isinstance(effect, AmountEffect) or effect.value == FALSE:
         return
     for at, term in enumerate(effect.arguments if effect.value == TRUE else (*effect.arguments, effect.value)):
@@ -250,7 +253,7 @@ class _Scope:
 
 
 def _scopes(conditions: Sequence[Condition], kinds: Mapping[str, str]) -> list[_Scope]:
-    """Return the conjunctions in nested conditions.
+    """Return the conjunctions that conditions contain, including nested conjunctions.
 
     The first conjunction contains the positive conditions. Each further conjunction consists of the positive conditions and an
     alternative or a negated conjunction.
@@ -303,7 +306,7 @@ def _span(scope: _Scope, start: set[str], more: set[str], known: Frame, found: R
 
 @dataclass(frozen=True)
 class _Step:
-    """A route from one term of a condition to another: the properties to follow, and the cost.
+    """A route from one term of a condition to another term: the properties that the route follows, and its cost.
 
     `constants` are the individuals that the source may denote. `looks_up` is the situation type with the source's position among
     the arguments; it is None if the source alone determines the symbol.
@@ -377,7 +380,7 @@ class _Search(Individuals):
     """The individuals that task recognition has read, and the search along routes."""
 
     def close(self, fresh: list[Triple], constants: set[str], bounds: Routes) -> None:
-        """Follow the routes until no new individual is found, by `ROUNDS` queries of one step each and then by a property path."""
+        """Follow the routes until no new individual is found: by `ROUNDS` queries of one step each, then by a property path."""
         reached, asked = set(self.seen), set[str]()
         classes = bounds.classes
         for _ in range(ROUNDS):
@@ -438,8 +441,8 @@ def _namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member])
 
     Only known namespaces are searched.
 
-    Each candidate IRI is looked up separately. An individual is included only if a class of the individual is stated. A class is
-    included only if it has individuals besides the nodes of the schema.
+    The candidates are looked up by their whole IRIs. An individual is included only if a class of the individual is stated. A
+    class is included only if it has individuals that don't belong to the description of behaviours.
     """
     terms = {iri for individual, kind, _ in members for iri in (individual, kind)} - schema.nodes.keys()
     endings = {local_name(iri) for iri in terms}
@@ -477,7 +480,7 @@ def _goal_situations(schema: Schema) -> set[str]:
 
 
 def _goal_individuals(schema: Schema) -> set[str]:
-    """Return the individuals in goals, and in facts without arguments."""
+    """Return the individuals that goals mention, or that facts without arguments mention."""
     goals = [schema.nodes.get(iri, {}) for iri in goal_conditions(schema)]
     nodes = chain(goals, schema.facts.values())
     named = {v for node in nodes for name in PLACES for v in node.get(name, ()) if v not in schema.nodes}

@@ -38,7 +38,7 @@ from confab.reasoner.vocabulary import CORE
 
 @dataclass
 class Past:
-    """The situation types of an ontology with the parts of a domain that concern earlier states.
+    """The situation types of an ontology, together with all parts of its domain that concern earlier states.
 
     `situations` contains all situation types of the ontology. Situation types, rules and constraints are added to express
     ``:atMostOnce`` and ``:onlyAfter``.
@@ -50,13 +50,13 @@ class Past:
     constraints: dict[str, Constraint] = field(default_factory=dict)
 
     def remember(self, name: str, source: str) -> str:
-        """Add a situation type that remembers another one, and return its name."""
+        """Add a situation type that remembers a given situation type, and return the new type's name."""
         self.remembers[name] = source
         self._add(name, source)
         return name
 
     def both(self, name: str, true: str, other: str, value: str) -> str:
-        """Add a situation type that is true if `true` is true and `other` has a value; return its name."""
+        """Add a situation type that is true if the type `true` is true and the type `other` has a value; return its name."""
         self._add(name, true)
         parameters = tuple(Parameter(f"?argument{i}", kind) for i, kind in enumerate(self.situations[true].arguments))
         terms = tuple(one.name for one in parameters)
@@ -67,7 +67,7 @@ class Past:
     def never(self, name: str, about: tuple[str, ...]) -> None:
         """Add the constraint that a situation type is never true.
 
-        The situation types that the ontology's author constrains are in `about`.
+        `about` contains the situation types on which the ontology's author stated the constraint.
         """
         self.constraints[f"{name}.exceptions"] = Constraint(name, about=about)
 
@@ -98,7 +98,7 @@ def past(parts: Parts, schema: Schema, situations: Sequence[SituationType]) -> P
     ------
     KnowledgeError
         A situation type has values other than true and false, or two related situation types have different numbers of arguments.
-        A remembered situation type has a level, a rest value or a default value, or a behaviour changes it.
+        A remembered situation type has a level, a rest value or a default value, or is changed by a behaviour.
     """
     found = Past({situation.name: situation for situation in situations})
     short = parts.names.short
@@ -125,7 +125,7 @@ def past(parts: Parts, schema: Schema, situations: Sequence[SituationType]) -> P
 
 
 def _checked(parts: Parts, schema: Schema, found: Past, iri: str) -> str:
-    """Return the IRI of the situation type that another situation type remembers; raise `KnowledgeError` if this is impossible."""
+    """Return the IRI of the original of a remembered situation type; raise `KnowledgeError` if the original can't be remembered."""
     source, name = parts.one(iri, "remembers"), parts.names.short(iri)
     _check_boolean(parts, found, iri, "remembers", iri, source)
     for said in ("fromLevel", "restValue", "defaultValue"):
@@ -145,7 +145,7 @@ def _checked(parts: Parts, schema: Schema, found: Past, iri: str) -> str:
 
 
 def _check_boolean(parts: Parts, found: Past, iri: str, word: str, *both: str) -> None:
-    """Raise `KnowledgeError` if a node is no situation type, or if its values aren't true and false."""
+    """Raise `KnowledgeError` unless a node is a situation type whose values are true and false."""
     for one in both:
         name = parts.names.short(one)
         if not parts.is_a(one, "SituationType"):

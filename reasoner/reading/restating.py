@@ -33,7 +33,7 @@ Node = Mapping[str, str]
 
 
 def with_facts(graph: KnowledgeGraph, reading: Reading, facts: Sequence[Fact]) -> KnowledgeGraph:
-    """Return a copy of a graph with the given facts instead of the facts about the same symbols.
+    """Return a copy of a graph in which the given facts replace the facts about the same symbols.
 
     The caller has to run inference on the copy.
 
@@ -64,7 +64,7 @@ def with_facts(graph: KnowledgeGraph, reading: Reading, facts: Sequence[Fact]) -
 
 
 def with_goals(graph: KnowledgeGraph, reading: Reading, goals: Sequence[Fact]) -> KnowledgeGraph:
-    """Return a copy of a graph with the given goals instead of the goals for the same symbols."""
+    """Return a copy of a graph in which the given goals replace the goals for the same symbols."""
     copy = _copied(graph)
     asserted, link = ox.NamedNode(BASE + "asserted"), ox.NamedNode(CORE + "goal")
     task = next((text(row[0]) for row in graph.select(TASKS)), f"{graph.scene.rstrip('#/')}#task")

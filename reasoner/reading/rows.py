@@ -64,7 +64,8 @@ class Schema:
     - `expressions` contains the definitions of classes, `axioms` contains the axioms about value properties, and `swrl`
       contains the SWRL rules.
     - `ontologies` contains the IRIs of the loaded files.
-    - `exclusive` contains the situation types of which, in physics, only one individual at a time can have a given value.
+    - `exclusive` contains the situation types whose values are exclusive: in physics, only one individual at a time can have a
+      given value.
     """
 
     nodes: Mapping[str, Node]

@@ -39,7 +39,7 @@ class Surroundings:
     Attributes
     ----------
     individuals : Individuals
-        The individuals that have been read.
+        The individuals that have been read from the graph so far.
     """
 
     def __init__(self, graph: KnowledgeGraph, slice_: Reading) -> None:
@@ -62,7 +62,7 @@ class Surroundings:
         return (named & self.schema.individuals_of) | (values - self.schema.pairs)
 
     def _add(self, fresh: set[str], classes: Iterable[str] = ()) -> None:
-        """Read some individuals, the members of some classes, and all individuals that are values of individuals read before."""
+        """Read individuals and members of classes, and then, repeatedly, the individuals that are values of read individuals."""
         seen, nodes = self.individuals.seen, self.schema.nodes
         while fresh or classes:
             rows = self.individuals.visit(fresh, {CORE + "about": fresh} if self.schema.tuples else None, classes)

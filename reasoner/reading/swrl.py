@@ -13,7 +13,7 @@ further class atoms of ``?x``                `ClassCondition`, or the conditions
 ``greaterThan(?w, 5)``, ``add(?s, ?w, 1)``   `Comparison`, `Calculation`
 ===========================================  ==================================================================
 
-For a variable that occurs only in the body, a functional value property determines its value, or it becomes the variable of a
+If a variable occurs only in the body, a functional value property determines the variable, or the variable becomes that of a
 `Witness`. Rules are DL-safe: variables denote only named individuals of the scene.
 """
 
@@ -246,7 +246,7 @@ class _Imp:
     # -------------------------------------------------------------------------------------------------------- concluding
 
     def _concluded(self, predicate: str, said: tuple[str, ...]) -> tuple[str, Rule]:
-        """Return the situation type that an atom of the head concludes, and the rule for this type."""
+        """Return the situation type about which an atom of the head states a conclusion, and the rule for this type."""
         definitions = self.definitions
         if len(said) == 1 and predicate in definitions.concluded:
             situation = definitions.concluded[predicate][0]

@@ -19,7 +19,7 @@ def with_times(problem: Problem, parts: Parts, schema: Schema) -> Problem:
     Raises
     ------
     KnowledgeError
-        A goal with a deadline isn't a fact that behaviours change, or a time window is empty.
+        A goal with a deadline isn't a fact that behaviours can change, or a time window is empty.
     """
     times = Times(deadlines(problem, parts, schema), windows(problem, parts, schema), {}, happenings(parts, schema))
     return replace(problem, times=times) if times != Times() else problem

@@ -18,8 +18,8 @@ in the update                               as individuals
 ``SELECT ?a (SUM(?n) AS ?s) … GROUP BY``    the `:aggregate` of the rule, `:over` the variables that have a type pattern
 ==========================================  =====================================================================
 
-All conditions, including the conditions of further operations, are evaluated in the state before the behaviour. A variable has
-the same value in all operations.
+All conditions, including the conditions of further operations, are evaluated in the state before the behaviour. A variable
+denotes the same individual or number in all operations of an update.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class UpdateCompiler:
     Attributes
     ----------
     known : set of str
-        The variables in the first WHERE of all updates compiled so far.
+        The variables that occur in the first WHERE of any update compiled so far.
     """
 
     def __init__(self, behavior: str, vocabulary: Vocabulary, declared: Mapping[str, tuple[str, str, int]]) -> None:
@@ -67,7 +67,10 @@ class UpdateCompiler:
         self.known: set[str] = set()
 
     def write(self, update: Update) -> None:
-        """Compile an update. Its first operation states preconditions and effects; further operations state conditional effects."""
+        """Compile an update.
+
+        The first operation of an update states preconditions and effects; further operations state conditional effects.
+        """
         own, operations = parsed(update.text)
         self.nodes.now, self.scope.prefixes = update, {**update.prefixes, **own}
         for name, (node, kind, number) in self.scope.declared.items():
@@ -98,7 +101,7 @@ class UpdateCompiler:
     def write_rule(self, query: Update) -> None:
         """Compile a CONSTRUCT query.
 
-        Its head is the rule's conclusion, and its WHERE states the rule's conditions or the aggregated tuples.
+        The head of the query is the rule's conclusion; its WHERE states the rule's conditions or the aggregated tuples.
         """
         own, rule = constructed(query.text)
         self.nodes.now, self.scope.prefixes = query, {**query.prefixes, **own}
@@ -175,7 +178,7 @@ class UpdateCompiler:
             self.effect(one, when, known, negated=False)
 
     def changes(self, one: Triple) -> None:
-        """Raise `UpdateError` unless the predicate of a triple is a situation type or its property, which behaviours can change."""
+        """Raise `UpdateError` unless the predicate of a triple is a situation type, or a value property of one."""
         prop = "" if one.predicate == A else self.scope.iri(one.predicate)
         if prop and prop not in self.scope.vocabulary.relations:
             return

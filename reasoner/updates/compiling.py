@@ -59,11 +59,11 @@ def compiled(ask: Ask, spelled: Mapping[str, Mapping[str, str]], prefixes: Mappi
     Parameters
     ----------
     ask : callable
-        Returns the rows of a query on the graph.
+        A function that returns the rows of a query on the graph.
     spelled : mapping of behaviour to prefixes
         The prefixes of the file that contains the behaviour's update.
     prefixes : mapping of prefix to namespace
-        The prefixes of all files, used if the file of an update is unknown.
+        The prefixes of all files; these prefixes are used if the file of an update is unknown.
     """
     texts: dict[str, str] = {}
     extends: dict[str, list[str]] = {}

@@ -22,7 +22,7 @@ from confab.reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, TYPE
 
 SIGNS = {sign: sign for sign in ("<", "<=", "=", ">=", ">")} | {"!=": "="}
 ANYONE = "?anyone"
-"""Name of the witness variable in a written absence condition."""
+"""Name of the witness variable in the SPARQL text of an absence condition."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class Conditions:
         return self.sought(self.scope.group(parts(graph), known), known, place(graph))
 
     def filter(self, expression: Any, known: Collection[str]) -> list[str]:
-        """Return the nodes of conditions whose conjunction is equivalent to a FILTER."""
+        """Return the nodes of conditions; their conjunction is equivalent to a FILTER."""
         one = unwrapped(expression)
         name = getattr(one, "name", "")
         if name == "ConditionalAndExpression":
@@ -137,13 +137,13 @@ class Conditions:
         )
 
     def equal(self, left: Any, right: Any, negated: bool, known: Collection[str]) -> str:
-        """Return the condition node that two terms are equal, or, if `negated`, that two terms are different."""
+        """Return the node of the condition that two terms are equal or, if `negated`, that they are different."""
         at = place((left, right))
         one, other = (self.scope.put(term(unwrapped(side), at), known, at) for side in (left, right))
         return self.nodes.condition("EqualityCondition", at, equality_properties(one, other), negated)
 
     def values(self, part: Any, known: Collection[str]) -> str:
-        """Return the condition node of VALUES: the variables equal the values of some row."""
+        """Return the condition node of a VALUES clause, which states that the variables equal the values of some row."""
         at = place(part)
         several = not isinstance(part.var[0], str) or len(part.var) > 1
         rows = [tuple(row) if several else (row,) for row in part.value or ()]
@@ -204,7 +204,7 @@ class Conditions:
 
     @property
     def pairs(self) -> Collection[str]:
-        """The situation types with several values per subject."""
+        """The situation types that can have several values for one subject."""
         return {s for p, s in self.scope.vocabulary.properties.items() if p not in self.scope.vocabulary.functional}
 
     def pattern(self, one: Triple, known: Collection[str]) -> str:

@@ -1,7 +1,7 @@
 """Conversion of the behaviours in a Turtle file to SPARQL updates or to individuals.
 
-The file is split into statements. Only the statements about behaviours and their parts are replaced. A behaviour that the other
-form can't express remains unchanged, and the reason is reported.
+The file is split into statements. Only the statements about behaviours and their parts are replaced. If the other form can't
+express a behaviour, the behaviour remains unchanged, and the reason is reported.
 """
 
 from __future__ import annotations
@@ -226,7 +226,10 @@ def _to_individuals(file: _File, graph: KnowledgeGraph, own: Sequence[str]) -> C
 def _exchange(
     file: _File, iri: str, links: Sequence[tuple[str, ox.NamedNode | ox.Literal]], behind: Sequence[str]
 ) -> None:
-    """Replace the conditions and effects of a behaviour by `links`; append the statements `behind` to its first statement."""
+    """Replace the conditions and effects of a behaviour by `links`.
+
+    The statements `behind` are appended to the behaviour's first statement.
+    """
     node = ox.NamedNode(iri)
     for number, statement in enumerate(file.said[iri]):
         rest = [t for t in statement.triples if t[1].value not in (*LINKS, *TEXT)]
@@ -312,7 +315,7 @@ def _differs(graph: KnowledgeGraph, iri: str, behavior: Behavior, written: str, 
 
 
 def compiled_again(graph: KnowledgeGraph, iri: str, written: str, prefixes: Mapping[str, str]) -> Behavior | str:
-    """Return the behaviour that results from compiling an update in the graph, or a text that states why compilation fails."""
+    """Return the behaviour that the compilation of an update in the graph yields, or the reason why the compilation fails."""
 
     def ask(query: str) -> Sequence[Sequence[object]]:
         if "?text" in query:

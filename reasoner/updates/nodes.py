@@ -25,7 +25,7 @@ class Nodes:
     links : Properties
         The properties of the behaviour itself.
     count : mapping of name to int
-        The number of nodes whose IRI contains the name.
+        For each name, the number of nodes whose IRI contains the name.
     now : Update
         The update that is being compiled.
     """

@@ -81,7 +81,7 @@ class Numbers:
         raise UpdateError(what, "compare and calculate with numbers, and with variables that amounts give one", at)
 
     def measured(self, one: Triple, known: Collection[str]) -> Measured:
-        """Return the amount or relation of a triple, with the triple's subject and other arguments."""
+        """Return the amount or relation that a triple names, with the arguments: the triple's subject, and possibly others."""
         prop, at = self.scope.iri(one.predicate), one.predicate.at
         terms = [self.scope.put(each, known, at) for each in (one.subject, *middle_of(one))]
         kind = "relation" if prop in self.scope.vocabulary.measures else "situationType"
@@ -126,7 +126,7 @@ def _term_or_none(tree: Any) -> Said | None:
 
 
 def unwrapped(expression: Any) -> Any:
-    """Return an expression without the grammar's nested levels that have only one operand."""
+    """Return an expression of the syntax tree without the nested levels that have only one operand."""
     passing = ("ConditionalOrExpression", "ConditionalAndExpression", "RelationalExpression", "AdditiveExpression")
     while getattr(expression, "name", "") in (*passing, "MultiplicativeExpression") and not expression.other:
         expression = expression.expr

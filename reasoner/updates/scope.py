@@ -1,6 +1,6 @@
 """Resolution of the variables in an update.
 
-The pattern that introduces a variable determines whether it is a term of the behaviour or a number.
+The pattern that introduces a variable determines whether the variable is a term of the behaviour or a number.
 """
 
 from __future__ import annotations
@@ -46,10 +46,10 @@ class Scope:
     nodes : Nodes
     vocabulary : Vocabulary
     declared : mapping of variable to (node, class, index)
-        The terms that the file declares outside the update.
+        The parameters and variables that the file declares outside the update.
     terms : mapping of variable to node
     kinds : mapping of node to (role, class, whether a witness binds it)
-        Two different variables with one name have two nodes.
+        Two different variables that have the same name have two nodes.
     prefixes : mapping of prefix to namespace
     numbers : mapping of variable to the triple or expression that gives its number
     """
@@ -144,7 +144,7 @@ class Scope:
         return found
 
     def begins(self, one: Triple, group: Group, known: Collection[str]) -> bool:
-        """Record the variables that a triple introduces; return whether the triple states no condition."""
+        """Record the variables that a triple introduces; return True if the triple states no condition."""
         subject, value = one.subject, one.object
         if one.predicate == A:
             if subject.variable and isinstance(value, Word) and not value.variable and subject not in known:

@@ -1,7 +1,7 @@
 """Parser of SPARQL updates and CONSTRUCT queries; it uses rdflib's grammar and adds positions.
 
 rdflib's grammar doesn't record positions. In a copy of the grammar, variables and names are parsed as a `Word` with its original
-text and position. All other parts of the syntax tree are those of rdflib.
+text and position. All other parts of the syntax tree are those that rdflib creates.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ Value = Word | Truth | Number | tuple[Said, ...]
 
 @dataclass(frozen=True)
 class Triple:
-    """A triple pattern; an object that is a list, such as ``(?shelf true)``, is a tuple."""
+    """A triple pattern. If its object is an RDF list, such as ``(?shelf true)``, the object is represented by a tuple."""
 
     subject: Word
     predicate: Word
@@ -65,7 +65,7 @@ class Triple:
 
 @dataclass(frozen=True)
 class Operation:
-    """``DELETE { … } INSERT { … } WHERE { … }``; `where` contains the parts of the WHERE group."""
+    """The operation ``DELETE { … } INSERT { … } WHERE { … }``; `where` contains the parts of the WHERE group."""
 
     delete: Sequence[Triple]
     insert: Sequence[Triple]
@@ -75,7 +75,10 @@ class Operation:
 
 @dataclass(frozen=True)
 class Construction:
-    """``CONSTRUCT { head } WHERE { … }``; for a SELECT in WHERE, the other fields describe its aggregate and GROUP BY."""
+    """The query ``CONSTRUCT { head } WHERE { … }``.
+
+    If WHERE contains a SELECT, the other fields describe the aggregate and the GROUP BY of the SELECT.
+    """
 
     head: Triple
     where: Sequence[Any]
@@ -206,7 +209,7 @@ def _prefixes(prologues: Iterable[Any]) -> dict[str, str]:
 
 
 def _copied(*elements: Any) -> tuple[Any, ...]:
-    """Return copies of grammar elements. The copies share the token by which pyparsing marks a missing optional part."""
+    """Return copies of grammar elements. All copies share the token with which pyparsing marks a missing optional part."""
     missing = pyparsing.Opt(pyparsing.Empty()).defaultValue
     return deepcopy(elements, {id(missing): missing})
 
@@ -339,7 +342,7 @@ def term(value: Any, at: int) -> Said:
     Raises
     ------
     UpdateError
-        The value is something else, for example a text or a blank node.
+        The value is of another kind, for example a text or a blank node.
     """
     if isinstance(value, Word):
         return value
@@ -360,7 +363,7 @@ def term(value: Any, at: int) -> Said:
 
 
 def _predicate(path: Any) -> Word:
-    """Return the property of a property path that consists of a single property."""
+    """Return the property of a property path, which must consist of a single property."""
     while not isinstance(path, Word):
         inner = path.part if isinstance(path.part, Word) else (path.part or [None])
         if path.mod or path.name == "PathEltOrInverse" or (not isinstance(inner, Word) and len(inner) != 1):
@@ -389,5 +392,5 @@ def words(tree: Any) -> Iterator[Word]:
 
 
 def place(tree: Any) -> int:
-    """Return the smallest position of a word in a part of the syntax tree; return 0 if the part contains no word."""
+    """Return the position of the first word in a part of the syntax tree; return 0 if the part contains no word."""
     return min((word.at for word in words(tree)), default=0)

@@ -1,7 +1,8 @@
 """Export of a behaviour as the SPARQL update that `confab.reasoner.updates.compiling` compiles to the same behaviour.
 
 The first line of WHERE states the parameters with their types; each further line states one condition. The type of a determined
-variable follows the condition that determines it, unless the variable may have every value of the situation type.
+variable follows the condition that determines the variable. The type is omitted if the variable may have every value of the
+situation type.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from confab.reasoner.symbols import (
 
 CHANGES = {"increase": "+", "decrease": "-", "scale": "*"}
 Spell = Callable[[str], str]
-"""Function that returns the notation of an individual, class or property."""
+"""A function that returns the notation of an individual, class or property."""
 
 
 @dataclass(frozen=True)
@@ -51,9 +52,9 @@ def update(behavior: Behavior, situations: Situations, spell: Spell, labels: Seq
     ----------
     behavior : Behavior
     situations : Situations
-        The keys are the names of situation types in the behaviour.
+        The situation types; the keys of the mappings are the names in the behaviour.
     spell : callable
-        Returns the notation of a name, e.g. ``:cup1``.
+        A function that returns the notation of a name, e.g. ``:cup1``.
     labels : sequence of str
         Labels of the preconditions in their order; they become comments.
     """
@@ -77,7 +78,8 @@ def _by_their_class(behavior: Behavior) -> Behavior:
 def _operations(behavior: Behavior) -> list[tuple[tuple[Condition, ...], list[ValueEffect | AmountEffect]]]:
     """Return the conditions and effects of each operation; the first operation has only the preconditions as conditions.
 
-    Operations are in the order of the effects. Effects that make facts false are added to an operation with the same conditions.
+    Operations are in the order of the effects. An effect that makes a fact false is added to an existing operation that has the
+    same conditions.
     """
     found: list[tuple[tuple[Condition, ...], list[ValueEffect | AmountEffect]]] = [((), [])]
     for effect in (e for e in behavior.effects if e.value != FALSE):
@@ -196,7 +198,7 @@ class _Writer:
 
         The keys of `known` are the variables bound so far; the values tell whether the type of the variable has been written.
         Variables that the conditions determine are added to `known` for all lines, because SPARQL ignores the order of patterns.
-        Only a class condition on a determined variable has to follow the condition that determines the variable.
+        One order matters: a class condition on a determined variable has to follow the condition that determines the variable.
         """
         said = list(_flat(zip(conditions, [*labels, *[""] * len(conditions)], strict=False)))
         for one, _ in said:
@@ -292,7 +294,7 @@ class _Writer:
     def asked_of_class(self, term: str) -> bool:
         """Return whether a class condition on a term exists.
 
-        If the term had no type pattern, the condition would be read as the term's type.
+        Without a type pattern for the term, the condition would be read as the type of the term.
         """
         return any(
             isinstance(inner, ClassCondition) and inner.term == term
@@ -314,7 +316,7 @@ def _flat(conditions: Iterable[tuple[Condition, str]]) -> Iterator[tuple[Conditi
 def _choice(alternatives: Sequence[Sequence[Condition]]) -> tuple[str, list[str]] | None:
     """Return the variable and the individuals of a disjunction.
 
-    Return None unless the disjunction only enumerates individuals of one variable.
+    Return None for a disjunction that doesn't just enumerate the individuals of one variable.
     """
     found: list[str] = []
     name = ""

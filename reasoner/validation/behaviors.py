@@ -33,7 +33,7 @@ EVERY_OTHER = re.compile(r"\?each\d")
 
 
 def undetermined_variables(case: Case) -> Iterator[Fault]:
-    """Find variables of effects and negated conditions that no positive condition determines."""
+    """Find variables in effects or negated conditions that no positive condition determines."""
     if case.reading is None:
         return
     domain = case.reading.problem.domain
@@ -83,9 +83,9 @@ def _undetermined(conditions: Sequence[Condition], bound: set[str]) -> set[str]:
 
 
 def other_kinds_in_when(case: Case) -> Iterator[Fault]:
-    """Find effects on all members of a class whose condition `when` refers to all members of another class.
+    """Find effects on all members of a class with a condition `when` on all members of another class.
 
-    Only classes with common members are reported.
+    Only classes that have common members are reported.
     """
     if case.reading is None:
         return
@@ -111,8 +111,8 @@ def other_kinds_in_when(case: Case) -> Iterator[Fault]:
 def unreachable_behaviors(case: Case) -> Iterator[Fault]:
     """Find values that behaviours or goals require, although they are neither initial values nor values of an effect.
 
-    If a value is unreachable only because another value is unreachable, one finding reports both values. Behaviours without
-    objects in the scene aren't reported, because they belong to other scenes.
+    If a value is unreachable only because another value is unreachable, one finding reports both values. A behaviour for which
+    the scene has no objects isn't reported, because the behaviour belongs to other scenes.
     """
     if case.reading is None or not case.reading.problem.initial:
         return
@@ -172,7 +172,7 @@ def unreachable_behaviors(case: Case) -> Iterator[Fault]:
 
 
 def _there_at_first(problem: Problem) -> set[tuple[str, str]]:
-    """Return the (situation type, value) pairs that hold initially or may hold without a behaviour."""
+    """Return the pairs (situation type, value) that hold initially, or that may come to hold without a behaviour."""
     there = {(symbol.situation, value) for symbol, value in problem.initial.items()}
     there |= {(s.name, FALSE) for s in problem.domain.situations.values() if s.boolean}
     changed = frozenset[str]().union(*(behavior.changes for behavior in problem.domain.behaviors.values()))
@@ -241,7 +241,7 @@ def _words(condition: Condition, behavior: Behavior) -> str:
 
 
 def gaps_of_values(case: Case) -> Iterator[Fault]:
-    """Find effects on a level whose value no behaviour of the next level gives.
+    """Find effects of a level whose value isn't given by any behaviour of the next level.
 
     Effects on situation types that the next level never changes aren't reported.
     """
@@ -303,7 +303,7 @@ def crowded_places(case: Case) -> Iterator[Fault]:
 
 
 def _none_has(condition: Condition, effect: ValueEffect) -> str:
-    """Return the class if a condition requires that no member of the class has an effect's value; otherwise an empty text."""
+    """Return the class of which no member has an effect's value according to a condition, or an empty text."""
     match condition:
         case Witness(variable, kind, (ValueCondition(situation, (about,), value, False),), True):
             same = (situation, about, value) == (effect.situation, variable, effect.value)

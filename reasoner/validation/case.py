@@ -19,7 +19,10 @@ Fault = tuple[str, str, str, str]
 
 @dataclass(frozen=True)
 class Case:
-    """Input of a validation rule: the graph, and the planning problem that was read from it (None for an unreadable problem)."""
+    """Input of a validation rule: the graph, and the planning problem that was read from the graph.
+
+    The problem is None if it can't be read.
+    """
 
     graph: KnowledgeGraph
     reading: Reading | None

@@ -7,7 +7,7 @@ individual has the value. Each level is checked separately.
 - *free*: The preconditions require that no individual has the value.
 - *handed over*: The same behaviour takes the value from the individual that has the value.
 - *taken*: The value is an object, and the same behaviour ends a state of this object in which no individual has the value.
-  (Example: a cup at a place is in no hand. The behaviour that gives the cup to a hand also takes the cup from the place, and each
+  (Example: a cup at a place is in no hand. The behaviour that gives the cup to a hand also takes the cup from its place, and each
   behaviour that brings a cup to a place takes the cup from a hand.)
 """
 
@@ -137,7 +137,7 @@ class _Exclusive:
                 return False
 
     def handed_over(self, behavior: Behavior, effect: ValueEffect) -> bool:
-        """Return whether the holder of an effect's value loses the value by the same behaviour, or is itself the receiver."""
+        """Return whether the previous holder of an effect's value loses the value, or is itself the receiver."""
         (own,) = effect.arguments
         return any(
             holder == own or self.releases(behavior, effect.when, holder, effect.value)
@@ -145,7 +145,7 @@ class _Exclusive:
         )
 
     def holders(self, behavior: Behavior, when: Sequence[Condition], value: str) -> Iterator[str]:
-        """Yield the terms that have a value according to the conditions."""
+        """Yield the terms that, according to the conditions, have a given value."""
         for condition in (*behavior.preconditions, *when):
             match condition:
                 case ValueCondition(self.situation, (holder,), of, False) if of == value:
@@ -163,7 +163,7 @@ class _Exclusive:
         )
 
     def taken(self, behavior: Behavior, effect: ValueEffect) -> Iterator[_Taken]:
-        """Yield the states of an effect's value that the same behaviour ends."""
+        """Yield the states of an effect's value that end by the same behaviour."""
         for condition in (*behavior.preconditions, *effect.when):
             match condition:
                 case ValueCondition(situation, (about,), before, False) if about == effect.value:
@@ -190,7 +190,7 @@ class _Exclusive:
         )
 
     def breaking(self, way: _Taken, behaviors: Sequence[Behavior]) -> Iterator[tuple[Behavior, str]]:
-        """Yield the behaviours, with their effect in words, that may give a holder to a value in the state `way`."""
+        """Yield the behaviours, with their effect in words, after which a value in the state `way` may have a holder."""
         for behavior in behaviors:
             for effect in self.given(behavior):
                 if not self.handed_over(behavior, effect) and not self.leaves(way, behavior, effect):
@@ -216,13 +216,13 @@ class _Exclusive:
                     yield behavior, f"gives {said}"
 
     def inside(self, way: _Taken, term: str, behavior: Behavior) -> bool:
-        """Return whether a term certainly denotes one of the values that define a state."""
+        """Return whether a term certainly denotes one of the values that define the state `way`."""
         if term[:1] == "?":
             return bool(way.kind) and self.below(behavior.kinds.get(term, ""), way.kind)
         return term == way.value or term in self.problem.classes.get(way.kind, ())
 
     def may_be_inside(self, way: _Taken, term: str, behavior: Behavior) -> bool:
-        """Return whether a term may denote one of the values that define a state."""
+        """Return whether a term may denote one of the values that define the state `way`."""
         if term[:1] != "?":
             return self.inside(way, term, behavior)
         kind = behavior.kinds.get(term, "")

@@ -26,7 +26,7 @@ TEXTS = tuple(ox.NamedNode(CORE + name) for name in ("update", "construct"))
 
 @dataclass(frozen=True, order=True)
 class Finding:
-    """A fault, or a fact worth knowing, in an ontology.
+    """A fault in an ontology, or a remark on the ontology.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class Finding:
     line : int
         The line of the node's first occurrence in the file, counted from 1; 0 if unknown.
     node, label : str
-        IRI and label (or local name) of the term at fault; empty if the finding is about the whole file.
+        IRI and label (or local name) of the term at fault; both are empty if the finding is about the whole file.
     rule : str
         Name of the violated rule.
     what, why, remedy : str
@@ -81,7 +81,7 @@ class Finding:
 
 
 def listing(findings: Sequence[Finding]) -> str:
-    """Return the text of findings for a terminal; errors come last, and common advice is printed once per group of findings."""
+    """Return the text of findings for a terminal. Errors come last; advice that several findings share is printed once."""
     parts = []
     for severity in (REMARK, WARNING, ERROR):
         own = [finding for finding in findings if finding.severity == severity]
@@ -130,7 +130,7 @@ class Places:
         return found[0].value if found else local_name(node)
 
     def _naming(self, node: str) -> Path | None:
-        """Return a file that mentions a node; the function is for nodes that are the subject in no file."""
+        """Return a file that mentions a node, for a node about which no file contains statements."""
         name = local_name(node)
         for file in self.graph.files.values():
             text = file.read_text(encoding="utf-8") if file.suffix == ".ttl" else ""

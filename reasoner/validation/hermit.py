@@ -1,13 +1,14 @@
 """Logical validation by the reasoner HermiT, which is contained in owlready2.
 
 One run of the reasoner determines whether the ontology is consistent, which named classes are empty in every model, and which
-behaviours have a precondition that no individual can satisfy. For the last question, each term of a behaviour becomes a class,
-its *prototype*, defined by the conditions on the term; variables become nested class expressions. If a prototype is empty, the
-conditions contradict the ontology. Two conditions on the same nested variable are examined separately; contradictions between
-them aren't found.
+behaviours have a precondition that no individual can satisfy. To detect unsatisfiable preconditions, each term of a behaviour
+becomes a class, its *prototype*. The conditions on the term define the prototype; variables become nested class expressions. If a
+prototype is empty, the conditions contradict the ontology. Two conditions on the same nested variable are examined separately;
+contradictions between them aren't found.
 
-HermiT compares all pairs of members of an ``owl:AllDifferent``, which takes minutes for a thousand objects. Instead, each member
-gets a different number as the value of one functional property. HermiT then draws the same conclusions in seconds.
+HermiT compares all pairs of members of an ``owl:AllDifferent``, which takes minutes for a thousand objects. In place of the
+``owl:AllDifferent``, each member gets a different number as the value of one functional property. With these numbers, HermiT
+draws the same conclusions in seconds.
 """
 
 from __future__ import annotations
@@ -120,7 +121,7 @@ def classify(graph: KnowledgeGraph, prototypes: str = "", *, types: bool = False
     NoJavaError
         No Java was found.
     KnowledgeError
-        HermiT can't process the ontology; the message contains HermiT's message.
+        HermiT can't process the ontology; the error contains HermiT's message.
     """
     lines = [  # without statements about literals
         line for line in graph.ntriples(SCENE).splitlines() if b' "' not in line or CARDINALITY.search(line)
@@ -266,7 +267,10 @@ class _ClassWriter:
         return _all(parts)
 
     def condition(self, condition: Condition, name: str, above: tuple[str, ...]) -> Iterator[str]:
-        """Yield the class expression that is equivalent to a condition on the term; yield nothing for other conditions."""
+        """Yield the class expression that is equivalent to a condition on the term.
+
+        For a condition that concerns other terms, nothing is yielded.
+        """
         match condition:
             case ValueCondition(situation, (about,), value, negated) if about == name:
                 iri = self.properties.get(self.reading.names.iri(situation))

@@ -34,7 +34,10 @@ def unlike_units(case: Case) -> Iterator[Fault]:
     }
 
     def unit(expression: Expression) -> tuple[str, str]:
-        """Return the unit of an expression (empty for no unit or any unit), and a mismatch inside the expression."""
+        """Return the unit of an expression, and a mismatch of units inside the expression.
+
+        The unit is empty if the expression has no unit or any unit.
+        """
         match expression:
             case Amount(situation):
                 return units.get(situation, ""), ""
@@ -85,7 +88,10 @@ def _together(behavior: Behavior) -> Iterator[tuple[Expression, Expression, str]
 
 
 def multiplied_amounts(case: Case) -> Iterator[Fault]:
-    """Find products and quotients of changing amounts. The search for plans of a whole level doesn't support them."""
+    """Find products and quotients of changing amounts.
+
+    The search for plans of a whole level doesn't support products and quotients of changing amounts.
+    """
     if case.reading is None:
         return
     domain, names = case.reading.problem.domain, case.reading.names
@@ -110,7 +116,10 @@ def multiplied_amounts(case: Case) -> Iterator[Fault]:
 
 
 def numbers_missing(case: Case) -> Iterator[Fault]:
-    """Find individuals without a number that a behaviour reads. The behaviour isn't applicable to these individuals."""
+    """Find individuals for which the ontology lacks a number that a behaviour reads.
+
+    A behaviour isn't applicable to an individual without a number that it reads.
+    """
     if case.reading is None:
         return
     problem, names = case.reading.problem, case.reading.names
@@ -141,7 +150,7 @@ def numbers_missing(case: Case) -> Iterator[Fault]:
 def _measured(
     conditions: Sequence[Condition], among: Mapping[str, tuple[str, frozenset[str]]], problem: Problem
 ) -> Iterator[tuple[str, str, frozenset[str]]]:
-    """Yield each relation that gives a number of a single term, with the term's class and possible individuals."""
+    """Yield each relation that assigns a number to a single term, with the term's class and possible individuals."""
     among = dict(among)
     for condition in conditions:
         if isinstance(condition, ClassCondition) and not condition.negated and condition.term in among:
@@ -245,7 +254,10 @@ class _Ranges:
                 return expression, expression
 
     def lacking(self, behavior: Behavior) -> tuple[str, str] | None:
-        """Return the reason why a behaviour is never applicable, and the ranges of the amounts concerned, or None."""
+        """Return the reason why a behaviour is never applicable, with the ranges of the amounts concerned.
+
+        Return None if the behaviour may be applicable.
+        """
         narrowed: dict[Expression, Range] = {}
         for condition in behavior.preconditions:
             if not isinstance(condition, Comparison) or condition.negated:
@@ -314,7 +326,7 @@ CONVERSE = {"<": ">", "<=": ">=", "=": "=", ">=": "<=", ">": "<"}
 
 
 def _possible(sign: str, left: Range, right: Range) -> bool:
-    """Return whether a comparison is true for some numbers of two ranges."""
+    """Return whether a comparison is true for some pair of numbers from two ranges."""
     match sign:
         case "<":
             return left[0] < right[1]
@@ -329,7 +341,7 @@ def _possible(sign: str, left: Range, right: Range) -> bool:
 
 
 def _narrowed(sign: str, left: Range, right: Range) -> Range:
-    """Return the numbers of the left range for which the comparison with some number of the right range is true, as a range."""
+    """Return the part of the left range in which a comparison with some number of the right range is true."""
     low = max(left[0], right[0]) if sign in (">", ">=", "=") else left[0]
     high = min(left[1], right[1]) if sign in ("<", "<=", "=") else left[1]
     return low, high

@@ -155,7 +155,7 @@ def _pairs(case: Case, predicate: str) -> Iterator[tuple[str, str]]:
 
 
 def files_and_iris(case: Case) -> Iterator[Fault]:
-    """Find files whose name isn't the last part of their ontology's IRI, and catalog entries that lead to another file."""
+    """Find files whose name differs from the last part of their ontology's IRI, and catalog entries that lead to another file."""
     read: dict[Path, Mapping[str, Path]] = {}
     for iri, file in case.graph.files.items():
         wanted = unquote(local_name(iri))

@@ -66,7 +66,7 @@ def durations_in_other_units(case: Case) -> Iterator[Fault]:
 
 
 def unit_of(expression: Expression, units: Mapping[str, str]) -> str | None:
-    """Return the unit of an expression; None if a unit isn't stated, or a number of the expression may convert units.
+    """Return the unit of an expression. Return None if a unit isn't stated, or if a number in the expression may convert units.
 
     >>> unit_of(Calculation("/", Measure("way", ()), Measure("speed", ())), {"way": "m", "speed": "m/min"})
     'min'
@@ -79,7 +79,7 @@ def unit_of(expression: Expression, units: Mapping[str, str]) -> str | None:
 
 
 def _powers(expression: Expression, units: Mapping[str, str]) -> Mapping[str, int] | None:
-    """Return the powers of the basic units of an expression; None for unknown powers."""
+    """Return the power of each basic unit in the unit of an expression; return None if the unit is unknown."""
     match expression:
         case Calculation(sign, left, right):
             one, other = _powers(left, units), _powers(right, units)

@@ -62,7 +62,7 @@ CONSEQUENCES = {
 }
 """Rules that are skipped for nodes that mention an undeclared term, because the faults may be consequences of this term."""
 SAID_BETTER = {"effect-without-situation-type": "effect-on-definition"}
-"""A mapping of a check to a more precise check; the first check skips the nodes about which the second check has a finding."""
+"""A mapping of a check to a more precise check. The first check skips each node about which the second check has a finding."""
 WRONG_FACTS = {"fact-outside-range", "fact-outside-domain", "fact-without-situation-type", "clashing-values"}
 WRONG_FACTS |= {"amount-out-of-bounds", "no-value"}
 """Checks whose findings are about initial facts or bounds, like the findings of ``impossible-situation``."""
@@ -95,7 +95,7 @@ def validate(
     files : sequence of str or Path
         Paths of files, or names of shipped scenes. Each file is checked together with its imports.
     deep : bool
-        Whether to run also HermiT, which needs Java.
+        Whether to run HermiT, too, which needs Java.
     done : callable, optional
         Function that is called with a description at the beginning of each stage: `STAGES` times per file, and once more if
         `deep`.
@@ -103,8 +103,8 @@ def validate(
     Returns
     -------
     list of Finding
-        Sorted by file and line, undeclared terms first. Empty if there are no faults. Findings that aren't `serious` are warnings
-        or remarks.
+        The findings, sorted by file and line; findings on undeclared terms come first. There are none if nothing is at fault.
+        Findings that aren't `serious` are warnings or remarks.
 
     Raises
     ------
@@ -260,7 +260,7 @@ def _unreadable(graph: KnowledgeGraph, places: Places, problem: KnowledgeError) 
 
 @dataclass(frozen=True)
 class Check:
-    """A query that must have no rows, and templates of the sentences for each row."""
+    """A query whose result must be empty, and templates of the sentences that describe a row of the result."""
 
     rule: str
     what: str
@@ -314,7 +314,7 @@ def _word(term: object) -> str:
 
 
 def _ill_formed(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
-    """Yield the findings of pySHACL; the sentences are annotations of the shapes."""
+    """Yield the findings of pySHACL. The sentences of a finding are annotations of the violated shape."""
     from pyshacl import validate as shacl
     from rdflib import BNode, Graph, Namespace
     from rdflib.namespace import RDFS
