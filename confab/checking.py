@@ -19,7 +19,7 @@ from confab.reasoner.symbols import Symbol
 def refused(
     graph: KnowledgeGraph, slice_: Reading, plan: Plan, goals: Sequence[str] = (), unmet: Collection[Symbol] = ()
 ) -> list[Fault]:
-    """Return the faults in the whole scene of a plan that was made in a part of the scene. A valid plan has no faults.
+    """Return the faults that a plan has in the whole scene, after it was made in a part of the scene. A valid plan has no faults.
 
     The checker first executes the plan with the individuals of the part. If conditions or effects depend on other individuals,
     these individuals are read from the graph, and the check is repeated. The check doesn't use the code that selects the part of

@@ -125,14 +125,14 @@ def parse_intervention(problem: Problem, text: str) -> Intervention:
 
 
 def _position(text: str) -> int:
-    """Return a text as the position of a step in a path; raise ValueError if the text isn't a natural number."""
+    """Convert a text to a position in a path of steps; raise ValueError if the text isn't a natural number."""
     if not text.isdigit():
         raise ValueError(text)
     return int(text)
 
 
 def _seconds(text: str) -> float:
-    """Return a text as a time in seconds; raise ValueError if the time is negative or infinite."""
+    """Convert a text to a time in seconds; raise ValueError if the time is negative or infinite."""
     seconds = float(text)
     if not 0 <= seconds < math.inf:
         raise ValueError(text)

@@ -274,7 +274,7 @@ KNOWN_WORDS = 0.4
 
 
 def whole(table: Mapping[str, str], name: str) -> str:
-    """Return the key of a table whose value contains a name, also in the plural or in the singular."""
+    """Return the key of a table whose value contains a name, its plural or its singular."""
     for same in (str, lambda word: word.rstrip("s")):
         for right, others in table.items():
             if same(name) in map(same, others.split()):

@@ -123,7 +123,7 @@ def ground_named(problem: Problem, text: str) -> tuple[str, tuple[str, ...]]:
     Raises
     ------
     KnowledgeError
-        The behaviour doesn't exist or doesn't accept these arguments.
+        The behaviour doesn't exist, or doesn't accept the given arguments.
     """
     name, *arguments = text.split() or [""]
     behavior = problem.domain.behaviors.get(name)

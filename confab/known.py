@@ -116,7 +116,10 @@ class Known(metaclass=RightNames):
 
     @cached_property
     def names(self) -> Names:
-        """The table of short names and IRIs. If the scene can't be read as a problem, the table has all terms in its files."""
+        """The table of short names and IRIs.
+
+        If the scene can't be read as a problem, the table has all terms in the scene's files.
+        """
         try:
             if "reading" in self.__dict__:
                 return self.reading.names
@@ -269,7 +272,7 @@ class Known(metaclass=RightNames):
 
     @property
     def owl(self) -> World:
-        """The scene as an owlready2 world. Changes of the world take effect in `query` and `plan`."""
+        """The scene as an owlready2 world. Changes of the owlready2 world take effect in `query` and `plan`."""
         return self._mirror.world
 
     def _forget(self) -> None:
@@ -392,7 +395,7 @@ class Known(metaclass=RightNames):
     def applicable_query(self, behavior: str) -> str:
         """Return the SPARQL query for the arguments with which a behaviour is applicable.
 
-        The method `query` answers this query for the initial state.
+        The method `query` answers the returned query for the initial state.
         """
         from confab.reasoner.graph.query_process import standing_alone
         from confab.reasoner.reading.affordance import applicable_query

@@ -1,4 +1,4 @@
-"""The class `Memory`, whose objects users of Python and the command line load, train, save, merge and show.
+"""The class `Memory` for users of Python and the command line, with methods that load, learn, save, merge and show.
 
 A memory file has two kinds of experience. Rules with counts guide the default planner (`confab.reasoner.memory.experience`). The
 links between facts and quantified behaviours guide the paper's mode (`confab.reasoner.memory.links`).
@@ -51,8 +51,8 @@ if TYPE_CHECKING:
 
 
 MOST_LINKS = 20_000
-"""Maximum number of the paper's links in a memory. If a plan would add more links, no links are added: only the default planner's
-experience learns from the plan.
+"""Maximum number of the paper's links in a memory. If a plan would add more links, it adds no links at all, but only rules and
+counts for the default planner.
 """
 SHOWN = 3
 """Maximum number of preferences that are listed for a method."""
@@ -201,7 +201,7 @@ class Memory(metaclass=RightNames):
         self.links = links
 
     def _linked(self, scene: Known, plan: Plan) -> Links:
-        """Return the paper's links after learning a plan; return the old links if there would be more than `MOST_LINKS`."""
+        """Return the paper's links after a plan was learned, or the old links if there would be more than `MOST_LINKS`."""
         learned = learn_plan(scene.problem, plan, self.links)
         return learned if len(learned) <= MOST_LINKS else self.links
 

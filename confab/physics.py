@@ -64,8 +64,8 @@ class Report(metaclass=RightNames):
     """The report of a verification: the rollouts (executions in simulation) of a plan, and the film of the first rollout.
 
     A rollout is good if every primitive had the expected effects and no final observation contradicts a goal. Effects on a
-    situation type without a perceiver can't be verified; `trusted` has the numbers of these effects by situation type. `perturb` and
-    `noise` are the parameters of `verify`.
+    situation type without a perceiver can't be verified; `trusted` has the numbers of these effects by situation type. `perturb`
+    and `noise` are the parameters of `verify`.
     """
 
     plan: Plan
@@ -344,7 +344,7 @@ def _shown(
     gui: bool,
     labels: Labels,
 ) -> Rollout:
-    """Execute the rollout with a given seed. The rollout is filmed, shown on the screen, or both."""
+    """Execute the rollout with a given seed. It is filmed, shown on the screen, or both."""
     watching: list[Callable[[Engine], None]] = []
 
     def watch(world: Engine) -> None:

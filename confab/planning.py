@@ -319,7 +319,7 @@ def result_of(scene: Known, plan: Plan, goals: Facts = ()) -> Result:
     plan : Plan
         The plan. It may leave soft goals unmet.
     goals : str or iterable of str
-        The goals of the plan, each of which replaces the scene's goal for the same symbol.
+        The goals of the plan. Each goal replaces the scene's goal for the same symbol.
 
     Raises
     ------

@@ -186,7 +186,9 @@ class Scene(Known):
         return plan_of(path, self.problem)
 
     def read_result(self, plan: AnyPlan, goals: Facts = ()) -> Result:
-        """Return a plan, for example the name of a file of `Result.save`, as a result that explains, verifies and executes it.
+        """Return a result with a given plan, which may be the name of a plan file.
+
+        The result can explain, verify and execute the plan.
 
         Each of the `goals` replaces the scene's goal for the same symbol, as in `plan`.
 

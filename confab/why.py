@@ -345,10 +345,10 @@ def why_not(
     Parameters
     ----------
     asked : str
-        The alternative: a goal, or a behaviour. A goal is a fact like ``cup2 LOCATION location8``. After ``by hand2`` at the end
-        of a goal, the individual ``hand2`` must take part in the changes of the fact. A behaviour has arguments in the order of
-        its parameters, as in ``B2_PICK right_hand cup1``, or by name, as in ``B2_PICK hand=right_hand``. Sentences of
-        explanations, such as ``pick cup 1 with right hand``, are also accepted.
+        The alternative: a goal, or a behaviour. A goal is a fact like ``cup2 LOCATION location8``. If a goal ends with ``by
+        hand2``, the individual ``hand2`` must take part in the changes of the fact. A behaviour has arguments in the order of its
+        parameters, as in ``B2_PICK right_hand cup1``, or by name, as in ``B2_PICK hand=right_hand``. Sentences of explanations,
+        such as ``pick cup 1 with right hand``, are also accepted.
     problem, plan
         The problem and its plan.
     labels : Labels

@@ -104,7 +104,7 @@ class Afterwards:
     Parameters
     ----------
     behavior : Behavior
-        The behaviour before effects on all members of a class are expanded.
+        The behaviour, in which an effect on all members of a class is still a single effect.
     situations : mapping of name to SituationType
     classes : mapping of class to individuals
     kinds : dict of term to class

@@ -167,7 +167,7 @@ def _replaceable(target: Path) -> os.stat_result | None:
 
 
 def _same_kind(target: Path, new: Kind | None) -> None:
-    """Raise `FileExistsError` if new content is of another kind than a file, and must not replace the file."""
+    """Raise `FileExistsError` if new content must not replace a file, because the file's content is of another kind."""
     old = kind_of(target)
     if old is not None and (new is None or not new.replaces(old)):
         what = "this output" if new is None or new.name == old.name else new.name

@@ -75,7 +75,7 @@ def generate(family: str, objects: int = 4, hands: int = 2, clutter: int = 0, se
     Raises
     ------
     KnowledgeError
-        The family is unknown, or has no layout for these numbers.
+        The family is unknown, or has no layout for the given numbers.
 
     Examples
     --------
@@ -89,7 +89,7 @@ def generate(family: str, objects: int = 4, hands: int = 2, clutter: int = 0, se
 def write_scene(path: Path, family: str, objects: int = 4, hands: int = 2, clutter: int = 0, seed: int = 0) -> None:
     """Write a generated scene to a file atomically, in pieces; the scene is named after the file.
 
-    The parameters have the meaning of the parameters of `generate`.
+    The parameters are explained at `generate`.
     """
     write_whole(path, stamped(GENERATED, pieces(family, objects, hands, clutter, seed, path.stem)))
 
@@ -215,9 +215,9 @@ def _crowded(objects: int, hands: int, random: Random) -> Layout:
 def _opposite(objects: int, hands: int, random: Random) -> Layout:
     """Return a layout in which objects have to change sides.
 
-    They are at places that only the first hand reaches, with goals that only the last hand reaches, or vice versa.
+    Objects at places that only the first hand reaches have goals that only the last hand reaches, and vice versa.
 
-    Objects without a place on these sides stay at places in the middle.
+    If the sides have too few places, the remaining objects stay at places in the middle.
     """
     places = range(1, 2 * objects + 1)
     reach = strips(objects, hands, places)

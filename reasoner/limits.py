@@ -47,7 +47,7 @@ class Deadline:
     def check(self, doing: str, ahead: float = 0.0) -> None:
         """Raise `OutOfTimeError` if the deadline has passed or is less than `ahead` seconds away.
 
-        The message names the work in progress by `doing`.
+        In the message, `doing` describes the work in progress.
         """
         if perf_counter() + ahead > self.at:
             raise OutOfTimeError(f"gave up after {self.seconds:g} s while {doing}; give more time")

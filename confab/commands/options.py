@@ -69,7 +69,10 @@ class Command(click.Command):
     """A command that refuses to use one file as input and output, one file for two outputs, or stdin for two inputs."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Parse the arguments. An error of the parser knows the command, so that its message can refer to the command's help."""
+        """Parse the arguments.
+
+        Errors of the parser get the command as context, so that their messages can refer to the command's help.
+        """
         try:
             return super().parse_args(ctx, args)
         except click.UsageError as error:

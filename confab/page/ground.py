@@ -133,7 +133,7 @@ def _drawn(shapes: Iterable[tuple[str, str]]) -> Ground | None:
 
 
 def _connected(problem: Problem) -> Ground | None:
-    """Return a layout in which static relations connect near places. Return None for fewer than three places."""
+    """Return a layout in which connected places are close together. Return None for fewer than three places."""
     import networkx
 
     values = _values(problem)

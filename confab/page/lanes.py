@@ -18,7 +18,9 @@ MOST_FIXED = 5000
 page states only their number.
 """
 LAST = 0.04
-"""Extension of the time axis after the last primitive, which shows the last effects, as a share of the plan's duration."""
+"""Extension of the time axis after the last primitive, as a share of the plan's duration. The extension shows the last
+effects.
+"""
 
 
 def axis_end(timeline: Timeline) -> float:

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from confab.sim.verify import Rollout
 
 MOST_HANDS = 8
-"""Maximum number of lanes. A lane has all primitives with the same first argument, such as a hand. If the primitives have more
-different first arguments, all primitives share one lane.
+"""Maximum number of lanes. A lane has all primitives with the same first argument, such as a hand. If the number of different
+first arguments exceeds this maximum, all primitives share one lane.
 """
 
 

@@ -71,7 +71,7 @@ def kept(
     Parameters
     ----------
     behavior : Behavior
-        The behaviour before effects on all members of a class are expanded.
+        The behaviour, in which an effect on all members of a class is still a single effect.
     aggregates : iterable of Aggregate
         Aggregates in the order of `in_order`.
     situations : mapping of name to SituationType
@@ -287,7 +287,7 @@ class _Keeping:
     ) -> Iterator[tuple[dict[str, str], Parameter | None, list[Formula]]]:
         """Yield tuples with a term for every variable.
 
-        A condition determines the term, or the term is a member of a class or each individual in turn.
+        The term for a variable is determined by a condition, is a member of a class, or is each individual in turn.
         """
         found, more = dict(tuple_), list[Formula]()
         determined = True

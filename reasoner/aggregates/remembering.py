@@ -77,7 +77,7 @@ def remembering(behavior: Behavior, count: Aggregate, domain: Domain, classes: M
     behavior : Behavior
         The behaviour with its effects on everything that the remembered situation type depends on.
     count : Aggregate
-        The count of the remembered situation type, by `count_of`.
+        The count of the remembered situation type, as `count_of` returns it.
     domain : Domain
     classes : mapping of class to individuals
 

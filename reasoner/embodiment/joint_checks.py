@@ -36,7 +36,7 @@ def joint_that_stays(embodiment: Embodiment) -> Iterator[Flaw]:
 
 
 def threshold_outside(embodiment: Embodiment) -> Iterator[Flaw]:
-    """Yield joints with faulty thresholds: never or always open, never or always shut, or open and shut at once."""
+    """Yield joints with faulty thresholds: a joint is always or never open, always or never shut, or both at once."""
     uses = [use for use in embodiment.perceivers.values() if use.perceiver == JOINT]
     perceived = {name for use in uses for name in use.links}
     for link in _links(embodiment):

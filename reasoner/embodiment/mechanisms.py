@@ -9,7 +9,9 @@ from confab.reasoner.embodiment.facts import BodyFacts, EmbodimentError
 from confab.reasoner.embodiment.values import Feature, Link, Mechanism, Part
 
 KINDS = {"box": ("size_x", "size_y", "size_z"), "cylinder": ("radius", "radius", "height"), "sphere": ("radius",) * 3}
-"""The attributes that state the size of a solid, for each kind of solid. From a radius, the size is twice the radius."""
+"""The attributes that state the size of a solid, for each kind of solid. If the attribute is a radius, the size is twice the
+radius.
+"""
 
 JOINTS = ("revolute", "prismatic", "fixed")
 

@@ -150,7 +150,7 @@ def guards(node: str, text: str) -> tuple[Guard, ...]:
 
 
 def evaluate(expression: str, known: Mapping[str, float]) -> float:
-    """Return the value of a sum of numbers and names.
+    """Return the value of an expression, which is a sum of numbers and of names with known values.
 
     >>> round(evaluate("raised-0.03", {"raised": 0.19}), 2)
     0.16

@@ -129,7 +129,7 @@ def _flaw(one: Block, other: Block, deep: float, where: str, remedy: str) -> Fla
 def overlapping_at_first(embodiment: Embodiment, initial: State) -> Iterator[Flaw]:
     """Yield objects that overlap another object, furniture or a mechanism in the initial state.
 
-    Two objects at the same place are checked by the rules on exclusive values instead.
+    Two objects at the same place aren't yielded, because the rules on exclusive values report this fault.
     """
     where, values = _initially(embodiment, initial)
     standing: dict[str, list[Block]] = {}

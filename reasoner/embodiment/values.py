@@ -28,8 +28,8 @@ class Hand:
     - `arm` and `fingers` are joint names; the value of a finger joint increases when the hand opens.
     - `home` is the rest posture, one angle per arm joint; `opening` is the open position of a finger joint; `grip` is the force of
       each finger.
-    - `gripper` is a URDF file that is mounted on the arm's link `flange` at `mounting` (x, y, z, roll, pitch, yaw). Names of its
-      links and joints begin with the hand's name.
+    - `gripper` is a URDF file that is mounted on the arm's link `flange` at `mounting` (x, y, z, roll, pitch, yaw). Names of the
+      gripper's links and joints begin with the hand's name.
     """
 
     name: str

@@ -1,8 +1,8 @@
 """OWL 2 RL inference before planning, which adds inferred triples to the graph `inferred`.
 
 Only static facts are inferred. Facts of situation types are excluded, because behaviours change these facts; only the domains and
-ranges of their properties are used. A class that is defined by situations is compiled into conditions instead
-(`confab.reasoner.reading.definitions`).
+ranges of their properties are used. The members of a class that is defined by situations aren't inferred; the class is compiled
+into conditions (`confab.reasoner.reading.definitions`).
 
 Subclasses are read without inference. The reasoner runs only if `needed` finds other axioms that have consequences. The limits of
 RL are listed in docs/inference.md.
@@ -112,7 +112,7 @@ def _of_behaviors(iri: str) -> bool:
 
 
 def _reason(triples: Iterator[ox.Triple]) -> Iterator[tuple[str, str, str]]:
-    """Yield the triples in the OWL 2 RL closure of some triples that consist only of IRIs."""
+    """Yield the triples in the OWL 2 RL closure of given triples; only triples of IRIs are yielded."""
     import tempfile
 
     import reasonable

@@ -227,7 +227,7 @@ def load(
     tolerant : bool
         Whether to load an RDF file even if it isn't a complete scene; the attribute `faults` of the graph then has the reasons.
     faults : list of Fault, optional
-        A list that receives the faults in behaviours that are written as updates. Without the list, a fault raises an error.
+        A list that receives the faults in behaviours that are written as updates. Without this list, a fault raises an error.
 
     Raises
     ------

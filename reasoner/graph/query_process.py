@@ -285,7 +285,7 @@ def _checked(graph: KnowledgeGraph, query: str, limits: QueryLimits, found: Answ
 
 
 def _explained(graph: KnowledgeGraph, query: str, error: str) -> str:
-    """Return the error message of a query in one line, with the text at the position or the name of an unknown prefix."""
+    """Return the error message of a query in one line, with the text at the faulty position or with an unknown prefix."""
     error = " ".join(LISTS.sub("unexpected", error).split())
     known = {*graph.spoken, *DECLARED.findall(query)}
     if unknown := next(iter(unknown_prefixes(graph, query)), None):

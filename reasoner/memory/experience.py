@@ -13,8 +13,8 @@ Experience  all learned items, with grow-only tallies by replica and epoch, whic
 Rules, orders, methods and kinds of goals are named by a hash of their content. Equal items of two replicas therefore have equal
 names, and a union of the replicas merges equal items. An item has one tally per lifted fact (`Fact`). The tally of the empty fact
 counts all uses of the item; the tally of another fact counts only uses in which the individuals in the item's roles satisfied the
-fact. The weight of tallies of epoch 0 never decays. Each further epoch belongs to one episode of a replica. Its tallies are
-preferences between individuals, for example between two hands; their weight decays with every later episode.
+fact. The weight of tallies of epoch 0 never decays. Each further epoch belongs to one episode of a replica. The tallies of a
+further epoch are preferences between individuals, for example between two hands; their weight decays with every later episode.
 """
 
 from __future__ import annotations
@@ -197,7 +197,7 @@ class Measured:
         return cls(len(seconds), round(mean, DIGITS), round(sqrt(squares / max(len(seconds) - 1, 1)), DIGITS))
 
     def __add__(self, other: Measured) -> Measured:
-        """Return the statistics of the executions of both.
+        """Return the statistics of all executions, for the statistics of two disjoint sets of executions.
 
         >>> Measured.of([1.0]) + Measured.of([2.0, 3.0]) == Measured.of([1.0, 2.0, 3.0])
         True

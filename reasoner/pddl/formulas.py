@@ -167,7 +167,10 @@ def some(variables: Iterable[Term], formula: Formula) -> Formula:
 
 
 def same(left: Term, right: Term) -> Formula:
-    """Return the equality of two terms. It is true for equal terms, and false for terms that can't denote the same individual."""
+    """Return the equality of two terms.
+
+    The equality is true for equal terms, and false for terms that can't denote the same individual.
+    """
     if left == right:
         return TRUE
     return Same(left, right) if left.members & right.members else FALSE

@@ -495,7 +495,7 @@ class _Import:
     def price(self, name: str) -> Expression | None:
         """Return the cost of an action: the weighted sum of the increases of functions in the metric.
 
-        Return None for an action without increases of these functions.
+        For an action that increases no function in the metric, None is returned.
         """
         found: Expression | None = None
         for effect in self.numeric[name]:
@@ -607,7 +607,7 @@ class _Import:
         yield from (dict(zip(names, row, strict=True)) for row in product(*things))
 
     def replaced(self, end: Effect, effects: Sequence[Effect]) -> bool:
-        """Return whether another effect always gives a new value to the symbol whose value an effect ends."""
+        """Return whether an effect that ends a symbol's value is redundant, because another effect gives a new value."""
         symbol = replace(self.atom(end.atom), value="")
         return any(
             e.true and e.atom[0] in self.places and replace(self.atom(e.atom), value="") == symbol

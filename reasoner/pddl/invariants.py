@@ -151,7 +151,7 @@ class Invariants:
         return domain
 
     def unbalanced(self, parts: Sequence[Part]) -> list[Part] | None:
-        """Return None if every action preserves the invariant; otherwise return parts that might be added to repair it."""
+        """Return None if every action preserves the invariant; otherwise return parts whose addition might repair the invariant."""
         of = {part.predicate: part for part in parts}
         for name, action in self.pddl.actions.items():
             effects = self.effects[name]

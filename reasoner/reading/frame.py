@@ -75,7 +75,7 @@ class Frame:
 
     `properties` maps the IRI of a value property to its situation type, and to whether an individual may have several values. In
     `domain`, maxima and minima have been replaced in all conditions, but behaviours don't yet update sums and counts. `lifted`
-    contains the behaviours before effects on all members of a class are expanded.
+    contains the behaviours in which an effect on all members of a class is still a single effect.
     """
 
     schema: Schema

@@ -28,7 +28,7 @@ class Individuals:
     Attributes
     ----------
     triples : ordered set of triples
-        All facts about the individuals in `seen`, and facts about other individuals that searches by values found.
+        All facts about the individuals in `seen`, and those facts about other individuals that were found through their values.
     seen : set of individuals
     """
 

@@ -1,6 +1,6 @@
 """Reading of planning problems from the knowledge graph.
 
-A few large queries read the graph. The rows of their results become nodes (`confab.reasoner.reading.rows`). The nodes become
+A few large queries read the graph. The rows of the results become nodes (`confab.reasoner.reading.rows`). The nodes become
 conditions, effects and behaviours (`confab.reasoner.reading.parts`) and goals (`confab.reasoner.reading.goals`) of a problem:
 
 ============================  ==============================================

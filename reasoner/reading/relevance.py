@@ -62,8 +62,8 @@ class Routes:
     """The properties (as IRIs) by which task recognition gets from relevant individuals to further relevant individuals.
 
     - `forward` contains the properties that are followed from subject to object.
-    - The keys of `backward` are the properties that are followed from object to subject. The values are constants from which a
-      property is followed in addition. A constant is a value that a behaviour names, such as "nothing"; many symbols may have
+    - The keys of `backward` are the properties that are followed from object to subject. The values are constants: a property is
+      followed from these constants, too. A constant is a value that a behaviour names, such as "nothing"; many symbols may have
       this value.
     - `classes` contains the classes whose individuals are all relevant.
     """

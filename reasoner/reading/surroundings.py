@@ -84,7 +84,7 @@ class Surroundings:
 
     @property
     def lifted(self) -> Mapping[str, Behavior]:
-        """The behaviours before effects on all members of a class are expanded."""
+        """The behaviours, in which an effect on all members of a class is still a single effect."""
         return self.frame.lifted
 
     def problem(self) -> Problem:

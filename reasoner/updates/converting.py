@@ -102,7 +102,7 @@ def convert(path: Path, form: Form) -> Converted:
     ----------
     path : Path
     form : str
-        ``sparql`` for SPARQL updates, ``individuals`` for individuals that are conditions and effects.
+        The form: ``sparql`` for SPARQL updates, or ``individuals`` for conditions and effects that are individuals.
 
     Raises
     ------

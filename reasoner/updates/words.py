@@ -56,7 +56,10 @@ Value = Word | Truth | Number | tuple[Said, ...]
 
 @dataclass(frozen=True)
 class Triple:
-    """A triple pattern. If its object is an RDF list, such as ``(?shelf true)``, the object is represented by a tuple."""
+    """A triple pattern.
+
+    If the object of a pattern is an RDF list, such as ``(?shelf true)``, the object is represented by a tuple.
+    """
 
     subject: Word
     predicate: Word

@@ -188,7 +188,7 @@ class _Inner:
 def repeated_names(case: Case) -> Iterator[Fault]:
     """Find negated conditions that contain a class condition on a term bound outside.
 
-    The author probably meant two different individuals.
+    The author of the ontology probably meant two different individuals.
     """
     if case.reading is None:
         return

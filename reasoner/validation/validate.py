@@ -103,7 +103,7 @@ def validate(
     Returns
     -------
     list of Finding
-        The findings, sorted by file and line; findings on undeclared terms come first. There are none if nothing is at fault.
+        The findings, sorted by file and line; findings on undeclared terms come first. The list is empty if there are no faults.
         Findings that aren't `serious` are warnings or remarks.
 
     Raises
