@@ -344,7 +344,7 @@ def _shown(
     gui: bool,
     labels: Labels,
 ) -> Rollout:
-    """Execute the rollout with a given seed. It is filmed, shown on the screen, or both."""
+    """Execute the rollout with a given seed. The rollout is filmed, shown on the screen, or both."""
     watching: list[Callable[[Engine], None]] = []
 
     def watch(world: Engine) -> None:

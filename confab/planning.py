@@ -64,7 +64,7 @@ OURS = 0.6
 OURS_WORK = 10_000_000
 """Maximum work of Confab's own search (states times operators) before an engine is tried, if there is no time limit.
 
-The search exhausts this maximum in about twenty seconds.
+The search does this maximum work in about twenty seconds.
 """
 
 
@@ -317,7 +317,7 @@ def result_of(scene: Known, plan: Plan, goals: Facts = ()) -> Result:
     ----------
     scene : Scene
     plan : Plan
-        The plan. It may leave soft goals unmet.
+        The plan, which may leave soft goals unmet.
     goals : str or iterable of str
         The goals of the plan. Each goal replaces the scene's goal for the same symbol.
 

@@ -204,7 +204,10 @@ class AnyOf:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A comparison of two numeric expressions by `operator` (a key of `amounts.COMPARING`). It is false if a value is missing."""
+    """A comparison of two numeric expressions by `operator` (a key of `amounts.COMPARING`).
+
+    The comparison is false if a value is missing.
+    """
 
     left: Expression
     operator: str

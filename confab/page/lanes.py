@@ -18,8 +18,8 @@ MOST_FIXED = 5000
 page states only their number.
 """
 LAST = 0.04
-"""Extension of the time axis after the last primitive, as a share of the plan's duration. The extension shows the last
-effects.
+"""Extension of the time axis after the last primitive, as a share of the plan's duration. The extended axis shows the effects of
+the last primitive.
 """
 
 

@@ -52,7 +52,7 @@ def update(behavior: Behavior, situations: Situations, spell: Spell, labels: Seq
     ----------
     behavior : Behavior
     situations : Situations
-        The situation types; the keys of the mappings are the names in the behaviour.
+        Properties of situation types; the keys are the names of situation types in the behaviour.
     spell : callable
         A function that returns the notation of a name, e.g. ``:cup1``.
     labels : sequence of str
