@@ -138,7 +138,7 @@ def explain(
     number : int
         The index in `steps` of the step to be explained.
     against : behaviour and arguments, optional
-        The alternative. By default, it is the most cogent of the other behaviours that the rules advise in the same state.
+        The alternative; by default the most cogent of the other behaviours that the rules advise in the same state.
     labels : Labels, optional
         The labels that the text uses for individuals.
 

@@ -10,7 +10,7 @@ from contextlib import suppress
 from xml.parsers import expat
 
 MOST_NESTED = 1_000
-"""Maximum nesting depth of a document; all parsers in use can read this depth. Ontologies have about ten levels."""
+"""Maximum nesting depth of a document; all parsers in use can read this depth. The nesting depth of ontologies is about ten."""
 PIECE = 256
 """Number of bytes that are counted at once; the depth may be overestimated by at most this number."""
 TURTLE = re.compile(
