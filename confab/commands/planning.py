@@ -429,7 +429,7 @@ def explain(
     time_limit: float | None,
     as_json: bool,
 ) -> None:
-    """Explain a plan, an alternative to a step, or why there is no plan."""
+    """Explain a plan, an alternative, or why there is no plan."""
     from confab.certificates import checked_certificate
     from confab.planning import Result
 
