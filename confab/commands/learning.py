@@ -71,7 +71,7 @@ def learn(
     time_limit: float | None,
     as_json: bool,
 ) -> None:
-    """Learn from solutions of scenes, from a demonstration, or from episodes."""
+    """Learn from solutions of scenes, a demonstration, or episodes."""
     from confab.curve import Curve, require_drawable
     from confab.interchange import read_plan
     from confab.memory import MOST_LINKS, Memory, undisturbed
