@@ -51,11 +51,18 @@ class Stated(list[str]):
             index = " ".join(index)
         if not isinstance(index, str):
             return super().__getitem__(index)
-        values = dict(fact.rsplit(" ", 1) for fact in self)
+        values = self._values()
         if index not in values:
             about = [symbol for symbol in values if index in symbol.split()]
             raise KeyError(f"no fact about '{index}'{nearest(index, about or values, ', '.join(about))}")
         return values[index]
+
+    def _values(self) -> dict[str, str]:
+        return dict(fact.rsplit(" ", 1) for fact in self)
+
+    def keys(self) -> list[str]:
+        """Return the symbols of the facts, so that ``dict(scene.facts)`` is a dictionary of their values."""
+        return [*self._values()]
 
     def __call__(self) -> Stated:
         """Return the list itself, so that ``scene.facts()`` is the same as ``scene.facts``."""

@@ -290,15 +290,19 @@ def by_words(table: Mapping[str, str], wanted: tuple[str, ...], least: float = K
     >>> by_words({"with_fact": "add set", "with_goal": "add", "facts": "state"}, ("add", "goal"))
     'with_goal'
     """
-    bags = dict[str, dict[str, float]]()
+    bags, same = dict[str, dict[str, float]](), dict[str, int]()
     for right, others in table.items():
-        names = (re.split(r"[( ]", right)[0].rpartition(".")[2], *others.split())
+        own = re.split(r"[ ,]", re.sub(r"\([^()]*\)", "", right))[0].rpartition(".")[2]  # the last call
+        names = (own, *others.split())
         bag = bags.setdefault(right, {})
-        for number, words in enumerate(map(words_of, names)):
+        for number, name in enumerate(names):
+            words = words_of(name)
             if {*map(stem, words)} == {*map(stem, wanted)}:
-                return right
+                same[right] = min(same.get(right, len(name)), len(name))
             for word in map(stem, words):
                 bag[word] = max(bag.get(word, 0.0), 1.0 + OWN * (number == 0) if len(words) == 1 else PART)
+    if same:
+        return min(same, key=lambda right: (same[right], len(right)))  # the longer names have fillers
     many = Counter(word for bag in bags.values() for word in bag)
     weights = {word: many[word] ** -0.5 if many[word] else UNKNOWN for word in map(stem, wanted)}
     worth = {
@@ -328,7 +332,8 @@ def guessed(kind: str, name: str, known: Iterable[str] = ()) -> str:
         return meant
     if get_close_matches(name, [*known], n=1, cutoff=TYPED):
         return ""
-    wanted = tuple(word for word in words_of(name) if stem(word) != stem(kind)) or words_of(name)
+    aside = {kind, *(OF_MODULE if kind == "confab" else ())}
+    wanted = tuple(word for word in words_of(name) if stem(word) not in map(stem, aside)) or words_of(name)
     return by_words(table, wanted) or _described_as(kind, name)
 
 

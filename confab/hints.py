@@ -15,7 +15,7 @@ MODULE = {
     "confab.load(SCENE)": "load_ttl read_owl load_rdf open read read_scene load_scene load_file load_ontology "
     "from_file parse World Ontology Problem Graph KnowledgeGraph Environment Env env get_ontology connect "
     "from_graph from_string from_text loads load_domain load_problem Domain Task get_scene get_problem "
-    "import_scene open_scene make gym Kitchen reader OWLReader Model Dataset Store kb infer knowledge_base "
+    "import_scene open_scene SceneLoader Loader make gym Kitchen reader OWLReader Model Dataset Store kb infer knowledge_base "
     "PlanningProblem new_problem from_name SceneGraph import_ontology",
     "confab.scenes()": "list_scenes list_examples available_scenes datasets samples examples catalog list all_scenes "
     "registry ls builtin shipped names list_domains domains problems get_scenes scene_names",
@@ -26,7 +26,7 @@ MODULE = {
     "confab.load(SCENE).query(TEXT)": "query ask sparql select SparqlQuery run_query execute_query question "
     "prepareQuery",
     "confab.load(SCENE).verify()": "verify simulate simulation Simulator PlanValidator SequentialPlanValidator "
-    "validate_plan check_plan rollout physics Simulation sim pybullet test_plan verify_plan Verifier",
+    "validate_plan check_plan evaluate rollout physics Simulation sim pybullet test_plan verify_plan Verifier",
     "confab.load(SCENE).execute()": "execute act step Executor Agent run_scene execute_plan dispatch perform "
     "tick rollout_plan run_plan start Runner BehaviorTree episode Monitor act_loop replay PlanExecutor Executive "
     "Controller Dispatcher",
@@ -68,7 +68,7 @@ MODULE = {
     "help(confab)": "help info docs doc man usage about describe",
     "confab.load(SCENE).verify(seed=SEED)": "seed set_seed random_seed rng",
     "confab.load(SCENE).plan().save(FILE)": "save dump write save_plan export_plan store to_json to_file",
-    "confab.practise(…)": "benchmark evaluate curve practice improve",
+    "confab.practise(…)": "benchmark curve practice improve",
     "confab mcp (in a shell)": "mcp tools agents llm",
     "confab --help (in a shell)": "main cli command_line commands",
     "confab fetch URL (in a shell)": "fetch download pull",
@@ -98,7 +98,7 @@ SCENE = {
     "fluent_value with_init without patch apply_fact set_location place_object put_on move_to set_position teleport "
     "put_object move_object",
     "with_goal": "set_goal add_goal with_goals set_goals replace_goal add_goals remove_goal change_goal set_task "
-    "clear_goals delete_goal del_goal update_goal new_goal add_task reset_goals set_target new_task want "
+    "set_objective clear_goals delete_goal del_goal update_goal new_goal add_task reset_goals set_target new_task want "
     "achieve_goal",
     "graph.remove(TRIPLE)": "remove delete remove_object remove_triple delete_object destroy_entity remove_individual remove_node "
     "remove_objects delete_individual destroy",
@@ -128,7 +128,7 @@ SCENE = {
     "objects": "individuals all_objects instances things entities get_objects instances_of objects_of_type "
     "nodes_of_type members subjects_of items object user_objects get_instances names_of_objects constants "
     "list_objects bodies search_objects get_individual get_object find_object object_names names_of",
-    "facts": "start_state perceive sense "
+    "facts": "head start_state perceive sense "
     "state initial initial_state init get_state observe values initial_values explicit_initial_values "
     "initial_value observation get_value initial_facts get_fact holds true_facts world_state fact value get_initial "
     "belief is_true check_fact fluent_values get_facts current_facts init_state atoms initial_defaults literals "

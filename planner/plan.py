@@ -152,6 +152,20 @@ class Plan(Sequence[Step], metaclass=RightNames):
             raise IndexError(f"no step {index}: the first level has {len(self.steps)}, counted from 0")
         return self.steps[index]
 
+    def index(self, value: object, start: int = 0, stop: int | None = None) -> int:
+        """Return the position of a step of the first level, which is given as `Step` or in a notation of ``plan[…]``.
+
+        Raises
+        ------
+        ValueError
+            The step isn't in this part of the first level.
+        """
+        wanted = self[value] if isinstance(value, str | tuple) else value
+        for position in range(*slice(start, stop).indices(len(self.steps))):
+            if self.steps[position] == wanted:
+                return position
+        raise ValueError(f"{wanted} is no step of the first level")
+
     def __repr__(self) -> str:
         """Return the number of steps per level, and the steps of the first level."""
         if not self.steps:

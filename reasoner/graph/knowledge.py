@@ -372,7 +372,8 @@ def scene_file(source: str | Path) -> Path:
         which = f"; did you mean '{files[0]}'?" if files else ", without a file of an ontology in it"
         raise KnowledgeError(f"'{source}' is {'a folder' if path.is_dir() else 'no file'}{which}")
     if len(path.parts) > 1 or path.suffix in ontology.SUFFIXES:
-        raise KnowledgeError(f"no scene '{source}': there is no such file")
+        hint = f"; did you mean the shipped scene '{path.stem}'?" if path.stem in shipped else ""
+        raise KnowledgeError(f"no scene '{source}': there is no such file{hint}")
     shipped = {name: file for name, file in shipped.items() if str(source).lower() in name} or shipped
     if near := nearest(str(source), shipped).removeprefix("; "):
         raise KnowledgeError(f"no scene '{source}': neither a file nor a shipped scene; {near}")

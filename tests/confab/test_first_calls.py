@@ -97,6 +97,8 @@ LATER: dict[str, Callable[[confab.Scene, confab.Result], object]] = {
         [*pytest.importorskip("pandas").DataFrame(scene.query("SELECT ?o { ?o k:location ?l }"))] == ["o"]
     ),
     "a scene for trials without a file": lambda scene, result: confab.generate("served").plan().solved,
+    "facts as a dictionary": lambda scene, result: dict(scene.facts)["cup1 LOCATION"] == scene.facts["cup1 LOCATION"],
+    "the position of a step": lambda scene, result: result.plan.index(result[0]) == result.plan.index("0") == 0,
 }
 SAID: dict[str, tuple[Callable[[confab.Scene, confab.Result], object], str]] = {
     "two goals in place": (lambda scene, result: scene.plan(GOAL, "cup1 LOCATION location7"), "goals=["),
@@ -105,6 +107,11 @@ SAID: dict[str, tuple[Callable[[confab.Scene, confab.Result], object], str]] = {
     "a memory of nothing": (lambda scene, result: confab.Memory(), "use confab.Memory.of"),  # type: ignore[call-arg]
     "a class among objects": (lambda scene, result: scene.objects["Cup"], "problem.classes"),
     "a scene to validate": (lambda scene, result: confab.validate(scene), "names of shipped scenes"),  # type: ignore[arg-type]
+    "a shipped scene as a file": (lambda scene, result: confab.load("two-cups.ttl"), "the shipped scene 'two-cups'"),
+    "a step that isn't there": (
+        lambda scene, result: result.plan.index("0.1"),
+        "is no step of the first level",
+    ),
     "a wrong column": (lambda scene, result: scene.query("SELECT ?o { ?o k:location ?l }")["ob"], "columns: o"),
 }
 
@@ -120,7 +127,7 @@ def test_a_further_first_call_works(
 def test_a_first_call_that_fails_says_what_does_it(
     scene: confab.Scene, result: confab.Result, call: Callable[[confab.Scene, confab.Result], object], hint: str
 ) -> None:
-    with pytest.raises((KnowledgeError, TypeError, KeyError)) as told:
+    with pytest.raises((KnowledgeError, TypeError, KeyError, ValueError)) as told:
         call(scene, result)
     assert hint in str(told.value)
 
