@@ -122,10 +122,17 @@ class Attempt:
         around = self.world.surroundings(self.hand.hand.name, self.held).without(*ignored)
         return Reacher(mover, around, margin)
 
-    def choose(self, stages: Sequence[Stage], objects: tuple[str, ...], opening: float | None = None) -> list[int]:
+    def choose(
+        self,
+        stages: Sequence[Stage],
+        objects: tuple[str, ...],
+        opening: float | None = None,
+        cost: Array | None = None,
+    ) -> list[int]:
         """Return the indices of the candidate poses that are reachable and collision-free at all stages, the cheapest first.
 
-        `opening` is the assumed opening of the fingers in metres, as after a release.
+        `opening` is the assumed opening of the fingers in metres, as after a release. `cost` (n,) is an additional cost
+        of each candidate.
 
         Raises
         ------
@@ -142,7 +149,8 @@ class Attempt:
                 left, solved = left[valid], [before[valid] for before in (*solved, q)]
                 if not len(left):
                     raise self._unreachable(stages, stage, objects)
-            order = np.argsort(self._discomfort(stages[0].poses[left], solved), kind="stable")
+            costs = self._discomfort(stages[0].poses[left], solved)
+            order = np.argsort(costs if cost is None else costs + cost[left], kind="stable")
             movers = self.hand.mover(THIN), self.hand.mover(opening)
             for least in (reacher.margin, *TIGHT, *([CLOSE - 2 * self.world.blur] if self.world.noise else [])):
                 scenes = [

@@ -288,6 +288,14 @@ def outer_radius(shape: Shape) -> float:
     return KINDS[shape.kind].outer(shape)
 
 
+def half_width(shape: Shape, height: float, turned: Array) -> Array:
+    """Return half of a shape's width (n,) between fingers at `height` above its base, for hands `turned` (n,) from its x axis."""
+    if shape.kind == "box":
+        width, depth = (shape.numbers[name] / 2 for name in ("width", "depth"))
+        return np.asarray(width * np.abs(np.sin(turned)) + depth * np.abs(np.cos(turned)))
+    return np.full(np.shape(turned), float(np.interp(height, *outline(shape))))
+
+
 def height_of(shape: Shape) -> float:
     """Return the height of the shape above its base."""
     return KINDS[shape.kind].height(shape)

@@ -20,6 +20,9 @@ from confab.sim.urdf import Array, Spheres, UrdfModel
 EDGE, BETWEEN = 0.004, 0.02
 """Radius of the spheres along the lower edge of a load, and distance between neighbouring spheres, in metres."""
 
+ABOVE = 0.01
+"""Height in metres above the base of a load, below which no sphere of the load reaches, since the base touches a table."""
+
 POINTS = 4000
 """Number of points whose distances are computed at once; larger arrays don't fit into the processor's cache."""
 
@@ -235,7 +238,8 @@ def fixed_spheres(model: UrdfModel, arms: Sequence[Arm]) -> Spheres:
 def column(heights: Array, radii: Array, bottom: float) -> Spheres:
     """Return spheres that cover an upright body of revolution above `bottom`, except the body's edges.
 
-    Ascending `heights` and `radii` give the outline of the body. Each sphere is as wide as the body at the sphere's centre.
+    Ascending `heights` and `radii` give the outline of the body. A sphere is as wide as the body at the sphere's centre, or a
+    ring of smaller spheres, if the wide sphere would protrude below the body.
 
     >>> column(np.array([0.0, 0.1]), np.array([0.03, 0.03]), 0.0).centers[:, 2].round(3).tolist()
     [0.02, 0.04, 0.06, 0.08]
@@ -244,7 +248,16 @@ def column(heights: Array, radii: Array, bottom: float) -> Spheres:
     ends = [min(float(np.interp(z, heights, radii)) * 2 / 3, (top - bottom) / 2) for z in (bottom, top)]
     first, last = bottom + ends[0], max(top - ends[1], bottom + ends[0])
     z = np.linspace(first, last, 1 + int(np.ceil((last - first) / (0.8 * float(np.min(radii))))))
-    return Spheres(np.stack([0 * z, 0 * z, z], -1), np.interp(z, heights, radii))
+    wide = np.interp(z, heights, radii)
+    radius = np.minimum(wide, z - min(bottom, ABOVE))
+    rings = [np.stack([0 * z, 0 * z, z], -1)]
+    owner = [np.arange(len(z))]
+    for i in np.flatnonzero(radius < wide):
+        out = wide[i] - radius[i]
+        around = np.linspace(0.0, 2 * np.pi, max(int(np.ceil(2 * np.pi * out / radius[i])), 3), endpoint=False)
+        rings.append(np.stack([out * np.cos(around), out * np.sin(around), 0 * around + z[i]], -1))
+        owner.append(np.full(len(around), i))
+    return Spheres(np.concatenate(rings), radius[np.concatenate(owner)])
 
 
 def rim(heights: Array, radii: Array) -> Spheres:

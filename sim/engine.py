@@ -391,6 +391,17 @@ class Engine:
         best = min(gaps, key=gaps.__getitem__, default="")
         return self.embodiment.places[best].carrier if best and gaps[best] < NEAR_PLACE else ""
 
+    def below(self, place: str) -> tuple[str, ...]:
+        """Return the carrier of a place; of a mechanism or link, return only the parts that reach down to the place.
+
+        A part that is wholly above the place, such as the board above a shelf, stays an obstacle.
+        """
+        carrier, point = self.embodiment.places[place].carrier, self.place(place)
+        if carrier not in self.links:
+            return (carrier,) if carrier else ()
+        solids = (solid for solid in self.links[carrier].solids() if solid.name == carrier)
+        return tuple(solid.part or carrier for solid in solids if solid.bounds()[0][2] < point[2] + STEP_UP)
+
     def top(self, name: str) -> Array:
         """Return the perceived middle (3,) of a body's top, such as the mouth of a vessel."""
         rotation, base = self.sense(name)

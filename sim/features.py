@@ -7,21 +7,28 @@ otherwise at most two turns are allowed.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from confab.reasoner.embodiment.values import Feature
-from confab.sim.bodies import height_of
+from confab.sim.arms import turn
+from confab.sim.bodies import half_width, height_of
 from confab.sim.engine import Engine
 from confab.sim.linkage import feature_frame
 from confab.sim.motion import SWIVELS, YAWS
 from confab.sim.urdf import Array
 from confab.sim.verdict import SkillError
 
+UP = np.array([0.0, 0.0, 1.0])
+
 AROUND = 2 * np.pi - 0.01
 """Minimum range of angles, in radians, that counts as a full turn."""
+
+SKEWED = 20.0
+"""Cost of a candidate per metre by which a box is wider between the fingers than at its faces."""
 
 TURNS = 13
 """Number of turns that are tried about a vertical axis with a limited range."""
@@ -29,12 +36,16 @@ TURNS = 13
 
 @dataclass(frozen=True)
 class FeatureFrame:
-    """A feature in the world: rotation (3, 3), point (3,), and the range in radians of a hand's turn about the feature's z."""
+    """A feature in the world: rotation (3, 3), point (3,), and the range in radians of a hand's turn about the feature's z.
+
+    `across` returns half of the width of an object between the fingers, in metres, for turns (n,).
+    """
 
     rotation: Array
     point: Array
     low: float = -np.pi
     high: float = np.pi
+    across: Callable[[Array], Array] | None = None
 
     @property
     def upright(self) -> bool:
@@ -58,20 +69,31 @@ class FeatureFrame:
 
 @dataclass(frozen=True)
 class Ways:
-    """Candidates (n,) for a hand at a feature: turns about the feature's z before and after a joint's motion, and swivels."""
+    """Candidates (n,) for a hand at a feature: turns about the feature's z before and after a joint's motion, and swivels.
+
+    `cost` (n,) is the cost of a turn at which the fingers don't lie flat on the faces of a box.
+    """
 
     first: Array
     last: Array
     swivel: Array
+    cost: Array | None = None
 
     def pick(self, i: int) -> Ways:
         """Return candidate number `i`."""
         return Ways(self.first[i : i + 1], self.last[i : i + 1], self.swivel[i : i + 1])
 
 
-def ways(frame: FeatureFrame, moving: bool) -> Ways:
-    """Return all candidates at a feature; if the feature's joint is `moving`, the hand may turn during the motion."""
+def ways(frame: FeatureFrame, moving: bool, opening: float = np.inf) -> Ways:
+    """Return all candidates at a feature at which an object fits between fingers that are open by `opening` metres each.
+
+    If the feature's joint is `moving`, the hand may turn during the motion.
+    """
     turns = frame.turns()
+    if frame.across is not None:
+        half = frame.across(turns)
+        turn, swivel = (part.ravel() for part in np.meshgrid(turns[half < opening], SWIVELS))
+        return Ways(turn, turn, swivel, SKEWED * (frame.across(turn) - half.min()))
     if not moving or not frame.upright or len(turns) == len(YAWS):
         turn, swivel = (part.ravel() for part in np.meshgrid(turns, SWIVELS))
         return Ways(turn, turn, swivel)
@@ -95,12 +117,14 @@ def locate(engine: Engine, name: str, feature: str, values: Mapping[str, float] 
             raise SkillError("ill-defined", (name,), f"{name} has no feature '{feature}'")
         turned, point = feature_frame(mechanic.frame(name, values), found)
         return FeatureFrame(turned, point, found.low, found.high)
-    base = engine.sense(name)[1]
+    rotation, base = engine.sense(name)
     shape = engine.bodies[name].shape
     height = {"base": 0.0, "grip": shape.grasp_height, "top": height_of(shape)}.get(feature)
     if height is None:
         raise SkillError("ill-defined", (name,), f"{name} has no feature '{feature}'")
-    return FeatureFrame(np.eye(3), base + np.array([0.0, 0.0, height]))
+    yaw = np.arctan2(rotation[1, 0], rotation[0, 0]) if shape.kind == "box" else 0.0
+    frame = FeatureFrame(turn(UP, np.array(yaw)), base + height * UP)
+    return replace(frame, across=partial(half_width, shape, height)) if height else frame
 
 
 def touched(engine: Engine, name: str, feature: str) -> tuple[str, ...]:

@@ -216,7 +216,8 @@ def connect(
     attempts : int
         Maximum number of samples.
     """
-    within = np.flatnonzero(reacher.solve(np.array(goals))[1]).tolist()  # unreachable goals can't end the search
+    q, valid = reacher.solve(np.array(goals))
+    within = np.flatnonzero(valid & reacher.free(q)).tolist()  # other goals can't end the search
     if within and reacher.follow(line(start, goals[within[0]])) is not None:
         return within[0], np.stack([start, goals[within[0]]])
     for i in within:

@@ -66,7 +66,7 @@ def observe_place(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) 
     if not world.knows(body):
         return None
     rotation, position = world.sense(body)
-    place, beside = level_place(world, position, use.numbers["contact_height"])
+    place, beside = level_place(world, position, use.numbers["contact_height"], world.load(body))
     if beside < use.numbers["nearness"] and tilt_of(rotation) < use.numbers["upright_angle"]:
         return place
     if any(world.held(hand) == body for hand in world.hands):
@@ -79,9 +79,8 @@ def measure_place(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) 
     if not world.knows(arguments[0]) or not world.embodiment.places:
         return {}
     rotation, position = world.sense(arguments[0])
-    gaps = [
-        position - world.place(name) for name, place in world.embodiment.places.items() if place.carrier != arguments[0]
-    ]
+    load = world.load(arguments[0])
+    gaps = [position - world.place(name) for name, place in world.embodiment.places.items() if place.carrier not in load]
     nearest = min(gaps, key=lambda gap: float(np.linalg.norm(gap)), default=None)
     if nearest is None:
         return {}

@@ -225,7 +225,11 @@ def _choose(run: Run, phase: Phase, later: Sequence[Phase]) -> tuple[Array, Ways
             break
         chain.append(one)
     frame, swings = run.at(phase.to), any(one.motion == "joint" for one in chain)
-    way = ways(frame, swings)
+    way = ways(frame, swings, run.spread)
+    if not len(way.first):
+        wide = 2 * (run.spread - room(run, phase.to))
+        message = f"{wide * 100:.1f} cm wide; the hand opens to {run.spread * 200:.1f} cm"
+        raise SkillError("no grasp", (run.feature_of(phase.to)[0],), message, wide_m=wide)
     poses = np.repeat(run.attempt.hand.pose[None], len(way.first), axis=0)
     stages: list[Stage] = []
     closed, released, around = False, False, None
@@ -250,23 +254,23 @@ def _choose(run: Run, phase: Phase, later: Sequence[Phase]) -> tuple[Array, Ways
             )
         closed = closed and one.fingers != "open"
         poses = stages[-1].poses
-    return stages[0].poses, way, _allowed(run, chain, stages)
+    return stages[0].poses, way, _allowed(run, chain, stages, way.cost)
 
 
-def _allowed(run: Run, chain: Sequence[Phase], stages: Sequence[Stage]) -> list[int]:
+def _allowed(run: Run, chain: Sequence[Phase], stages: Sequence[Stage], cost: Array | None) -> list[int]:
     """Return the candidates that allow all stages, with room for corrections if possible, or with narrower fingers if needed."""
-    narrow = any(one.motion == "yielding" and room(run, run.feature_of(one.to)[0]) < ROOM for one in chain)
+    narrow = any(one.motion == "yielding" and room(run, one.to) < ROOM for one in chain)
     if narrow or run.world.blur:
         with suppress(SkillError):  # corrections on the way are impossible with a stretched arm
             spare = [replace(stage, fold=FOLD, slack=max(stage.slack, TURNED)) for stage in stages]
-            return run.attempt.choose(spare, run.things(), run.spread)
+            return run.attempt.choose(spare, run.things(), run.spread, cost)
     try:
-        return run.attempt.choose(stages, run.things(), run.spread)
+        return run.attempt.choose(stages, run.things(), run.spread, cost)
     except SkillError:
         if run.numbers.get("spread", 0.0) <= NARROW:
             raise
     run.numbers = {**run.numbers, "spread": NARROW}
-    return run.attempt.choose(stages, run.things(), run.spread)
+    return run.attempt.choose(stages, run.things(), run.spread, cost)
 
 
 def _swing(run: Run, phase: Phase, poses: Array, way: Ways, ignored: tuple[str, ...]) -> list[Stage]:

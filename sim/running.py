@@ -112,7 +112,7 @@ class Run:
                 height = self.world.place(place)[2] + LEDGE
                 fixtures = self.world.embodiment.fixtures
                 found += [one.name for one in fixtures if one.position[2] + one.size[2] / 2 < height]
-                found += [name for name in [self.world.embodiment.places[place].carrier] if name]
+                found += self.world.below(place)
             elif "." in word:
                 found += touched(self.world, *self.feature_of(word))
             elif word in self.roles:

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from confab.reasoner.embodiment.values import Phase
-from confab.sim.bodies import outline
 from confab.sim.measuring import finger_force, finger_forces
 from confab.sim.motion import line
 from confab.sim.running import Run
@@ -135,7 +134,7 @@ def go_around(run: Run, phase: Phase, name: str, goal: Array) -> None:
     hand = run.attempt.hand
     still = name in run.world.links
     body = run.world.links[name].body if still else run.world.bodies[name].body
-    speed = run.number(phase.speed) * min(max(room(run, name) / ROOM, SLOWEST), 1.0)
+    speed = run.number(phase.speed) * min(max(room(run, phase.to, goal[3]) / ROOM, SLOWEST), 1.0)
     back = -ASIDE_BY * hand.frame()[0][:, 0]
     patience = YIELDS
     while True:
@@ -160,9 +159,13 @@ def go_around(run: Run, phase: Phase, name: str, goal: Array) -> None:
     run.arrived(goal)
 
 
-def room(run: Run, name: str) -> float:
-    """Return the distance in metres between an object and each open finger; infinite for other things."""
-    if name not in run.world.bodies:
+def room(run: Run, target: str, yaw: Array | None = None) -> float:
+    """Return the distance in metres between an object at a feature and each open finger; infinite for other things.
+
+    The hand has the heading `yaw`, or the heading with the most room.
+    """
+    frame = run.at(target)
+    if frame.across is None:
         return np.inf
-    shape = run.world.bodies[name].shape
-    return run.spread - float(np.interp(shape.grasp_height, *outline(shape)))
+    turns = frame.turns() if yaw is None else yaw - np.arctan2(frame.rotation[1, 0], frame.rotation[0, 0])
+    return run.spread - float(np.min(frame.across(turns)))

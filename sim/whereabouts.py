@@ -6,7 +6,7 @@ the object has moved away. A hand that was stopped on its way has no named posit
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -33,12 +33,19 @@ def point_of(world: Engine, name: str) -> Array:
     return point
 
 
-def level_place(world: Engine, point: Array, height: float) -> tuple[str, float]:
-    """Return the nearest place whose height differs by less than `height` metres from a point, and the horizontal distance."""
-    points = {name: world.place(name) for name in world.embodiment.places}
-    gaps = {name: float(np.hypot(*(point - at)[:2])) for name, at in points.items() if abs(point[2] - at[2]) < height}
-    best = min(gaps, key=gaps.__getitem__, default="")
-    return best, gaps.get(best, np.inf)
+def level_place(world: Engine, point: Array, height: float, load: Collection[str] = ()) -> tuple[str, float]:
+    """Return the nearest place whose height differs by less than `height` metres from a point, and the horizontal distance.
+
+    Places on the bodies of `load` are left out. A place on a body takes precedence over the place at which this body stands.
+    """
+    places = {name: place for name, place in world.embodiment.places.items() if place.carrier not in load}
+    gaps = {name: point - world.place(name) for name in places}
+    near = {name: float(np.hypot(*gap[:2])) for name, gap in gaps.items() if abs(gap[2]) < height}
+    for carrier in {places[name].carrier for name, away in near.items() if away < NEAR_PLACE} & world.bodies.keys():
+        if world.knows(carrier):
+            near.pop(level_place(world, point_of(world, carrier), height, {*load, carrier})[0], None)
+    best = min(near, key=near.__getitem__, default="")
+    return best, near.get(best, np.inf)
 
 
 def arrived(world: Engine, hand: str, motion: str, target: str) -> None:
@@ -47,7 +54,7 @@ def arrived(world: Engine, hand: str, motion: str, target: str) -> None:
         world.hands[hand].at = Whereabouts(floor=world.hands[hand].at.floor)
     elif target in world.embodiment.places or (target in world.bodies and world.knows(target)):
         point = point_of(world, target)
-        place, beside = level_place(world, point, LEVEL)
+        place, beside = level_place(world, point, LEVEL, world.load(target if target in world.bodies else None))
         floor = world.place(place)[2] if beside < NEAR_PLACE else point[2]
         world.hands[hand].at = Whereabouts(target, point, float(floor))
 
