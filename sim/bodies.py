@@ -32,6 +32,8 @@ from confab.sim.urdf import Array
 with suppress(ImportError):  # shapes can be measured without PyBullet
     import pybullet
 
+UP = np.array([0.0, 0.0, 1.0])
+
 PLANKS = 12
 """Number of flat boxes in each ring of a vessel's wall."""
 
@@ -72,8 +74,11 @@ def inner_radius(shape: Shape, height: Array) -> Array:
 
 
 def make_vessel(client: int, shape: Shape, position: Array, orientation: Array) -> int:
-    """Make a vessel from a generated URDF, since PyBullet's compound shapes are limited to 16 parts."""
-    planks = [*_planks(shape)]
+    """Make a vessel from a generated URDF, since PyBullet's compound shapes are limited to 16 parts.
+
+    PyBullet's parser requires short lines.
+    """
+    planks = [PLANK.format(**plank) for plank in _planks(shape)]
     base = shape.profile[0][1] + wall(shape)
     inertia = shape.mass * (base**2 / 2 + vessel_height(shape) ** 2 / 12)
     mesh = _revolved(shape)
@@ -143,26 +148,23 @@ PLANK = """<collision>
 <geometry><box size="{thick:.6f} {width:.6f} {length:.6f}"/></geometry></collision>"""
 
 
-def _planks(shape: Shape) -> Iterator[str]:
-    """Yield the boxes of a vessel's wall as URDF text, one ring for each segment of the profile.
-
-    PyBullet's parser requires short lines.
-    """
+def _planks(shape: Shape) -> Iterator[dict[str, float]]:
+    """Yield the measures of the boxes of a vessel's wall, one ring for each segment of the profile."""
     thickness = wall(shape)
     for (low, r_low), (high, r_high) in pairwise(shape.profile):
         radius = (r_low + r_high) / 2 + thickness / 2
         for i in range(PLANKS):
             angle = 2 * math.pi * i / PLANKS
-            yield PLANK.format(
-                x=radius * math.cos(angle),
-                y=radius * math.sin(angle),
-                z=(low + high) / 2,
-                lean=math.atan2(r_high - r_low, high - low),
-                angle=angle,
-                thick=thickness,
-                width=2 * (max(r_low, r_high) + thickness) * math.tan(math.pi / PLANKS),
-                length=math.hypot(high - low, r_high - r_low),
-            )
+            yield {
+                "x": radius * math.cos(angle),
+                "y": radius * math.sin(angle),
+                "z": (low + high) / 2,
+                "lean": math.atan2(r_high - r_low, high - low),
+                "angle": angle,
+                "thick": thickness,
+                "width": 2 * (max(r_low, r_high) + thickness) * math.tan(math.pi / PLANKS),
+                "length": math.hypot(high - low, r_high - r_low),
+            }
 
 
 def _revolved(shape: Shape) -> str:
@@ -301,14 +303,22 @@ def height_of(shape: Shape) -> float:
     return KINDS[shape.kind].height(shape)
 
 
-def pieces(shape: Shape) -> Iterator[tuple[str, tuple[float, float, float], float]]:
-    """Yield the solids that represent an upright shape in motion planning: kind, half extents, and height of the middle.
+def pieces(shape: Shape, hollow: bool = False) -> Iterator[tuple[str, tuple[float, float, float], Array, Array]]:
+    """Yield the solids that represent a shape in motion planning: kind, half extents, middle (3,) and rotation (3, 3).
 
-    A vessel is a cylinder, since a hand doesn't reach into a vessel.
+    A vessel is a solid cylinder, or with `hollow` a bottom and a wall, if objects are put into the vessel.
     """
     if shape.kind == "box":
         width, depth, height = (shape.numbers[name] / 2 for name in ("width", "depth", "height"))
-        yield "box", (width, depth, height), height
+        yield "box", (width, depth, height), height * UP, np.eye(3)
+        return
+    if hollow and shape.kind == "vessel":
+        half, base = wall(shape) / 2, shape.profile[0][1] + wall(shape)
+        yield "cylinder", (base, base, half), half * UP, np.eye(3)
+        for plank in _planks(shape):
+            turned = pybullet.getMatrixFromQuaternion(pybullet.getQuaternionFromEuler([0, plank["lean"], plank["angle"]]))
+            size = plank["thick"] / 2, plank["width"] / 2, plank["length"] / 2
+            yield "box", size, np.array([plank["x"], plank["y"], plank["z"]]), np.array(turned).reshape(3, 3)
         return
     ends = (
         pairwise(shape.profile) if shape.kind == "turned" else [((0.0, 0.0), (height_of(shape), outer_radius(shape)))]
@@ -316,7 +326,7 @@ def pieces(shape: Shape) -> Iterator[tuple[str, tuple[float, float, float], floa
     for (low, below), (high, above) in ends:
         if high - low > STEP:
             radius = max(below, above)
-            yield "cylinder", (radius, radius, (high - low) / 2), (low + high) / 2
+            yield "cylinder", (radius, radius, (high - low) / 2), (low + high) / 2 * UP, np.eye(3)
 
 
 def outline(shape: Shape) -> tuple[Array, Array]:

@@ -125,6 +125,12 @@ class Engine:
         self.beads: list[Bead] = []
         self.contents: dict[str, list[str]] = {}
         self.filled: dict[str, float] = {}
+        self.containers = {  # bodies with a place below their top
+            place.carrier
+            for place in embodiment.places.values()
+            if place.carrier in embodiment.bodies
+            and place.position[2] < height_of(embodiment.bodies[place.carrier].shape)
+        }
         self.moved_by_others: set[str] = set()  # bodies that other hands or interventions move during the present skill
         self.client = pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT)
         if self.client < 0:
@@ -488,8 +494,8 @@ class Engine:
         for name, thing in self.bodies.items():
             if name not in load and self.knows(name):
                 rotation, base = self.taken_along(name, values) if values else self.sense(name)
-                for kind, half, height in pieces(thing.shape):
-                    solids.append(Solid(name, kind, np.array(half), base + rotation[:, 2] * height, rotation))
+                for kind, half, middle, turned in pieces(thing.shape, name in self.containers):
+                    solids.append(Solid(name, kind, np.array(half), base + rotation @ middle, rotation @ turned))
         around = Surroundings(tuple(solids))
         for name, spheres in self.standing.items():
             around = around.plus(name, spheres)

@@ -15,14 +15,12 @@ import numpy as np
 
 from confab.reasoner.embodiment.values import Feature
 from confab.sim.arms import turn
-from confab.sim.bodies import half_width, height_of
+from confab.sim.bodies import UP, half_width, height_of
 from confab.sim.engine import Engine
 from confab.sim.linkage import feature_frame
 from confab.sim.motion import SWIVELS, YAWS
 from confab.sim.urdf import Array
 from confab.sim.verdict import SkillError
-
-UP = np.array([0.0, 0.0, 1.0])
 
 AROUND = 2 * np.pi - 0.01
 """Minimum range of angles, in radians, that counts as a full turn."""
