@@ -50,7 +50,7 @@ def test_the_arms_know_where_the_base_has_come_to(tables: Embodiment) -> None:
 
 
 def test_a_base_goes_round_what_stands_in_its_way(tables: Embodiment) -> None:
-    box = Fixture("box", (0.12, 0.12, 0.9), (-0.41, 0.28, 0.45))
+    box = Fixture("box", (0.12, 0.12, 0.9), (-0.46, 0.28, 0.45))
     with world(tables, box) as here:
         drive(here, "two_arms", "aside")
         assert here.observe()[next(s for s in here.symbols if s.situation == "STANDS_AT")] == "aside"
