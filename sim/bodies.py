@@ -316,7 +316,9 @@ def pieces(shape: Shape, hollow: bool = False) -> Iterator[tuple[str, tuple[floa
         half, base = wall(shape) / 2, shape.profile[0][1] + wall(shape)
         yield "cylinder", (base, base, half), half * UP, np.eye(3)
         for plank in _planks(shape):
-            turned = pybullet.getMatrixFromQuaternion(pybullet.getQuaternionFromEuler([0, plank["lean"], plank["angle"]]))
+            turned = pybullet.getMatrixFromQuaternion(
+                pybullet.getQuaternionFromEuler([0, plank["lean"], plank["angle"]])
+            )
             size = plank["thick"] / 2, plank["width"] / 2, plank["length"] / 2
             yield "box", size, np.array([plank["x"], plank["y"], plank["z"]]), np.array(turned).reshape(3, 3)
         return

@@ -80,7 +80,9 @@ def measure_place(world: Engine, use: PerceiverUse, arguments: tuple[str, ...]) 
         return {}
     rotation, position = world.sense(arguments[0])
     load = world.load(arguments[0])
-    gaps = [position - world.place(name) for name, place in world.embodiment.places.items() if place.carrier not in load]
+    gaps = [
+        position - world.place(name) for name, place in world.embodiment.places.items() if place.carrier not in load
+    ]
     nearest = min(gaps, key=lambda gap: float(np.linalg.norm(gap)), default=None)
     if nearest is None:
         return {}

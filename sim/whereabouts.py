@@ -41,7 +41,8 @@ def level_place(world: Engine, point: Array, height: float, load: Collection[str
     places = {name: place for name, place in world.embodiment.places.items() if place.carrier not in load}
     gaps = {name: point - world.place(name) for name in places}
     near = {name: float(np.hypot(*gap[:2])) for name, gap in gaps.items() if abs(gap[2]) < height}
-    for carrier in {places[name].carrier for name, away in near.items() if away < NEAR_PLACE} & world.bodies.keys():
+    carriers = {places[name].carrier for name, away in near.items() if away < NEAR_PLACE}
+    for carrier in sorted(carriers & world.bodies.keys()):
         if world.knows(carrier):
             near.pop(level_place(world, point_of(world, carrier), height, {*load, carrier})[0], None)
     best = min(near, key=near.__getitem__, default="")

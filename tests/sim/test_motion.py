@@ -131,6 +131,16 @@ def test_postures_that_touch_nothing_are_those_whose_distances_say_so(serving: C
         assert 0 < found.sum() < len(q)
 
 
+def test_a_goal_in_collision_is_never_come_to(serving: Case) -> None:
+    """A search that grew from this goal would end there, although the last step leads into the pillar."""
+    blocked = reacher(serving.embodiment, pillar())
+    beside = np.repeat(GOAL[None], 60, axis=0)
+    beside[:, :2] = np.linspace((0.45, 0.0), (0.45, 0.22), 60)
+    first = int(np.argmin(blocked.free(blocked.solve(beside)[0])))  # the previous pose is free
+    assert first
+    assert connect(blocked, START, [beside[first]], np.random.default_rng(0), attempts=300) is None
+
+
 def test_a_goal_beyond_a_joint_s_limit_is_never_come_to(serving: Case) -> None:
     """A search that grew from this goal would end there, and the hand could plan no further motion from that pose."""
     blocked = reacher(serving.embodiment, pillar())

@@ -18,6 +18,7 @@ from confab.sim.verify import expectations
 from confab.sim.world import PhysicsWorld
 
 RIGHT = Path(__file__).parent / "right"
+EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 
 
 def scene(name: str, folder: Path) -> Scene:
@@ -30,6 +31,8 @@ def scene(name: str, folder: Path) -> Scene:
         *[(name, *pair) for name in ("peg", "shelf", "cupboard") for pair in ((0.0, 4105), (0.004, 4106))],
         ("tray", 0.004, 4106),
         ("handover", 0.004, 4106),
+        ("pots", 0.004, 4106),
+        ("blocks", 0.004, 4106),
     ],
 )
 def test_perturbed_rollouts_verify(name: str, noise: float, seed: int, tmp_path: Path) -> None:
@@ -39,6 +42,21 @@ def test_perturbed_rollouts_verify(name: str, noise: float, seed: int, tmp_path:
     trial = Trial(one.embodiment, one.problem.initial, steps, expected, Perturbation(), False, noise)
     rollout = trial.run(seed)
     assert rollout.ok, rollout.failure
+
+
+def test_a_pot_that_carries_a_place_is_not_at_its_own_place_and_what_is_in_the_pot_is(tmp_path: Path) -> None:
+    one = scene("pots", tmp_path)
+    with PhysicsWorld(one.embodiment, one.problem.initial, 3, Perturbation()) as world:
+        seen = {
+            symbol.arguments[0]: value for symbol, value in world.observe().items() if symbol.situation == "LOCATION"
+        }
+    assert seen == {"pot_a": "p1", "pot_b": "p2", "pen": "in_a", "lid": "on_b"}
+
+
+def test_a_board_above_a_place_stays_an_obstacle_of_a_load_that_leaves_the_place(tmp_path: Path) -> None:
+    one = with_reach(confab.load(shutil.copy(EXAMPLES / "workshop" / "workshop.ttl", tmp_path)))
+    with PhysicsWorld(one.embodiment, one.problem.initial) as world:
+        assert {part.rpartition(".")[2] for part in world.below("inside")} == {"left", "right", "back"}
 
 
 def test_the_outer_fitting_is_opened_first_and_shut_last(tmp_path: Path) -> None:
