@@ -40,7 +40,7 @@ STATES, STEPS = 400, 12
 """
 WAYS = 20
 """Number of alternatives of derived bits that are processed in the time in which one operator is examined."""
-SIZES = (8, 16, 32, 64)
+SIZES = (8, 16, 32)
 """Lengths of windows in steps; a long window can contain a whole round trip that a shorter plan avoids."""
 OPERATORS, EVALUATIONS, SHARE = 150, 100, 2_000
 """Limits of the search of a window: the number of operators, and the minimum number of evaluations of h_FF.
@@ -210,7 +210,7 @@ class _Windows:
     """Maximum number of evaluations of h_FF in the search of a window."""
     deadline: float | None
     failed: set[tuple[int, int, float]] = field(default_factory=set)
-    """Windows without a cheaper replacement, each as a state, required bits and a cost."""
+    """Windows that weren't replaced, each as a state, required bits and a cost."""
 
     @cached_property
     def cut(self) -> float:
@@ -245,6 +245,7 @@ class _Windows:
                     states, needed = _states(self.task, plan), self.needed(plan)
                     start = max(0, start - size // 2)
                     continue
+            self.failed.add((states[start], needed[end] & states[end], spent))
             if end == len(plan):
                 break
             start += size // 2
@@ -276,15 +277,17 @@ class _Windows:
         operators = self.near(steps, state, wanted)
         task, operators = self.part(operators, state, wanted)
         found = self.search(task, spent, self.most)
-        if found is None:
-            self.failed.add((state, wanted, spent))
-            return None
-        return [operators[operator] for operator in found]
+        return None if found is None else [operators[operator] for operator in found]
 
     def restarted(self, plan: list[int]) -> list[int]:
-        """Return a cheaper plan that a search with all operators finds within the remaining work, or the given plan."""
+        """Return a cheaper plan that a search with all operators finds within the remaining work, or the given plan.
+
+        The work must suffice for the successors of as many states as the plan has steps.
+        """
         following = 1 + self.task.derived.effort // WAYS
         most = self.work // (max(len(self.task.owners), 1) * following)
+        if most < len(plan) * len(self.task.applicable(self.task.initial)[0]):
+            return plan
         found = self.search(self.task, self.task.cost_of(plan), most, WEIGHT)
         return plan if found is None else shortened(self.task, found, self.deadline)
 

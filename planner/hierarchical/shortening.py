@@ -4,10 +4,10 @@ The first method plans the goals again in other orders, and reuses known refinem
 of a level by cheaper steps (`confab.planner.hierarchical.windows`). The third method removes steps whose changes cancel out
 (`confab.planner.hierarchical.detours`).
 
-Other orders and first-level windows are tried only if the plan moves an object away or has many steps per goal. Windows of lower
-levels, which may refine several steps together, are tried only if the plan has several steps or moves an object away. The cheapest
-plan is kept; among equally cheap plans, the plan with the fewest primitives. Steps of the first level explain the steps below.
-Therefore steps of the first level are dropped only if the plan becomes much cheaper.
+Other orders are tried only if the plan moves an object away or has many steps per goal. Windows, which may refine several steps
+together, are tried only if a shorter plan is likely. The cheapest plan is kept; among equally cheap plans, the plan with the fewest
+primitives. Steps of the first level explain the steps below. Therefore steps of the first level are dropped only if the plan
+becomes much cheaper.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from time import perf_counter
 from confab.planner.hierarchical.agenda import Agenda
 from confab.planner.hierarchical.call import Call, fresh_call
 from confab.planner.hierarchical.detours import without_detours
-from confab.planner.hierarchical.windows import improves, primitives, windowed
+from confab.planner.hierarchical.windows import improves, lower_bound, primitives, windowed
 from confab.planner.plan import Plan
 from confab.planner.plan_costs import compared
 from confab.planner.transitions import Cell, arguments_of, key_of
@@ -64,6 +64,8 @@ def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Cal
     `LEAST_ROUNDS` rounds. A brief call has one round with little work, or no round if the call has a time limit.
     """
     least = LEAST_ROUNDS if lasting(call) else 1
+    if prices(call) > 1 and call.bound is None:
+        call.bound = lower_bound(call)
     brief, repeated = (call.space.shortening == name for name in ("brief", "repeated"))
     improve = 1 if brief else improve
     work, random = max(call.space.effort, LEAST_EFFORT) * improve // (2 * ORDERS), Random(0)
@@ -78,30 +80,29 @@ def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Cal
 
 
 def shorten_once(call: Call, work: int, leave_levels: bool, advised: Callable[[Call], None], random: Random) -> None:
-    """Try other orders of the goals, windows of each level, and the removal of detours, each with bounded work."""
+    """Try other orders of the goals, the removal of detours, and windows of the lower levels, each with bounded work."""
     levels = call.program.levels
     aside = len(levels) > 1 and puts_aside(call)
     if aside or (len(levels) > 1 and len(call.steps) > MANY * len(call.goal)):
         reordered(call, work, advised, random)
-        windowed(call, levels[0], work)
     if not leave_levels:
         return
     if aside:
         drop_detours(call, levels[-2])
     detours = drop_detours(call, levels[-1])
-    together = len(call.steps) > 1 and (aside or detours or lasting(call))  # a shorter joint refinement is likely
-    for level in levels[1:-1] if aside or together else ():
-        windowed(call, level, work, inherit=True)
-    if detours or call.given_up or len(levels) == 1 or lasting(call):
-        windowed(call, levels[-1], work)
-    if len(levels) > 1 and together:
-        windowed(call, levels[-1], work, inherit=True)
+    if aside or detours or call.given_up or len(levels) == 1 or lasting(call):
+        for level in levels[1:] or levels:
+            windowed(call, level, work)
 
 
 def lasting(call: Call) -> bool:
     """Return whether the cost of a refinement may depend on earlier steps, or on a choice of primitives with different costs."""
-    primitives = call.problem.domain.at_level(call.program.levels[-1])
-    return call.refiner.drifting or len({(one.cost, one.price) for one in primitives}) > 1
+    return call.refiner.drifting or prices(call) > 1
+
+
+def prices(call: Call) -> int:
+    """Return the number of different costs of a call's primitives."""
+    return len({(one.cost, one.price) for one in call.problem.domain.at_level(call.program.levels[-1])})
 
 
 def cost(call: Call) -> float:

@@ -33,13 +33,9 @@ MOST_ROWS, OF_A_STEP = 20_000, 500
 """Maximum number of rows of a join when a level is grounded for shortening: in total, and for each step of the plan."""
 
 
-def windowed(call: Call, level: int, work: int, inherit: bool = False) -> None:
-    """Replace steps of a level in a call's plan by cheaper steps, if that improves the plan (`improves`).
-
-    If `inherit`, the new steps also satisfy the preconditions that the upper levels impose on their changes, unless the level with
-    these preconditions is too large.
-    """
-    new = cheaper(call, level, work, inherit)
+def windowed(call: Call, level: int, work: int) -> None:
+    """Replace steps of a level in a call's plan by cheaper steps, if that improves the plan (`improves`)."""
+    new = cheaper(call, level, work)
     if new is None:
         return
     other = fresh_call(call, call.problem)
@@ -57,40 +53,45 @@ def windowed(call: Call, level: int, work: int, inherit: bool = False) -> None:
             return
 
 
-def cheaper(call: Call, level: int, work: int, inherit: bool) -> list[Ground] | None:
+def cheaper(call: Call, level: int, work: int) -> list[Ground] | None:
     """Return a cheaper sequence of steps of a level for a call's plan, without refinements.
 
-    Return None if no cheaper sequence is found, or if the level is too large.
+    The steps also satisfy the preconditions that the upper levels impose on their changes, unless the plan violates these, or the
+    level with these preconditions is too large. Return None if no cheaper sequence is found, or if the level is too large.
     """
     steps = [one for step in call.steps for part in parts(step, level) for one in part.together]
     if any(step.level != level for step in steps):
         return None
     from confab.planner.grounded.plan_windows import shorter
-    from confab.planner.grounded.shortest import least
 
-    bound = [replace(call.problem, domain=binding(call.problem, level))] if inherit else []
-    for problem in (*bound, call.problem):
-        task = small(problem, level, call.space.deadline, OF_A_STEP * len(steps))
+    for domain in (binding(call.problem, level), call.problem.domain):
+        task = small(call, replace(call.problem, domain=domain), level, OF_A_STEP * len(steps))
         operators = task.operators_of([(step.behavior, step.arguments) for step in steps]) if task is not None else None
         if operators is not None:
             break
     if task is None or operators is None:
         return None
-    if level == call.program.levels[-1] and problem is call.problem:
-        call.bound = least(task)
     found = shorter(task, operators, work, call.space.deadline)
     better = (task.cost_of(found), len(found)) < (task.cost_of(operators), len(operators))
     return [task.describe(operator)[:2] for operator in found] if better else None
 
 
-def small(problem: Problem, level: int, deadline: float | None, most: int) -> Task | None:
+def lower_bound(call: Call) -> float | None:
+    """Return a lower bound on the cost of every plan of a call's problem, or None if the lowest level is too large."""
+    from confab.planner.grounded.shortest import least
+
+    task = small(call, call.problem, call.program.levels[-1], MOST_ROWS)
+    return None if task is None else least(task)
+
+
+def small(call: Call, problem: Problem, level: int, most: int) -> Task | None:
     """Return the grounded task of a level with the goals and rest values that the level sees, or None if the level is too large."""
     from confab.planner.grounded.grounding import ground
     from confab.planner.grounded.task import Task
 
     goal = {s: value for s, value in problem.goal_on(level).items() if problem.sees(level, s, value)}
     try:
-        task = ground(problem, level, goal=goal, most=min(most, MOST_ROWS), deadline=deadline)
+        task = ground(problem, level, goal=goal, most=min(most, MOST_ROWS), deadline=call.space.deadline)
     except UngroundableError:
         return None
     return task if isinstance(task, Task) else None
