@@ -64,8 +64,8 @@ def impossible(problem: Problem, state: State) -> Iterator[Impossible]:
         if situation.quantity is None and value in (declared | {TRUE, FALSE}) and value not in among:
             yield Impossible(
                 symbol,
-                f"{symbol} is {value}, which is no value of {situation.name}",
-                "no behaviour leads to such a value, and none is asked for it",
+                f"the value of {symbol} is {value}, which isn't a value of {situation.name}",
+                "no behaviour gives or requires such a value",
                 f"name an individual of {situation.name}",
             )
     if not wrong:
@@ -102,7 +102,7 @@ def refuse_derived(domain: Domain, facts: Iterable[Fact], cause: str = "") -> No
             text = f"a rule defines {name}; change a fact that it follows from"
             raise ImpossibleStateError(f"{cause or fact}: {text}")
         if name in domain.remembers and fact.value == FALSE:
-            text = f"{name} remembers {domain.remembers[name]}, and never becomes false; leave the fact out"
+            text = f"{name} remembers {domain.remembers[name]}, so it never becomes false; leave the fact out"
             raise ImpossibleStateError(f"{cause or fact}: {text}")
 
 
@@ -122,13 +122,15 @@ def values_at_fault(state: State, domain: Domain, declared: Container[str]) -> I
                 continue
             if name in domain.aggregates:
                 remedy = f"change the facts from which {name} is calculated, or the bound of {name}"
-            yield Impossible(symbol, f"{symbol} is {value[:40]}; {limits}", "amounts keep to their bounds", remedy)
+            yield Impossible(
+                symbol, f"{symbol} is {value[:40]}; {limits}", "an amount never violates its bounds", remedy
+            )
         for name in symbol.arguments if quantity else (*symbol.arguments, value):
             if name not in declared and name not in (TRUE, FALSE):
                 yield Impossible(
                     symbol,
                     f"{symbol} is {value}, but {name} isn't declared as an individual",
-                    "an unknown name is read as a new one",
+                    "an unknown name is read as a new individual",
                     "declare it, or correct the name",
                 )
 
@@ -183,16 +185,16 @@ def _held_elsewhere(problem: Problem, state: State) -> Iterator[Impossible]:
                 yield Impossible(
                     symbol,
                     f"{symbol} is {value}, but no {_owner(problem, held.name)} has {thing} as its {held.name}",
-                    "what is in a hand is held by one",
-                    f"state {held.name} {thing} of the one that holds it, or another {place.name} of {thing}",
+                    "an object in a hand is held by exactly one hand",
+                    f"state {held.name} {thing} of the hand that holds {thing}, or another {place.name} of {thing}",
                 )
         elif hand is not None and POSITION in by:
             at = state.get(Symbol(by[POSITION].name, hand.arguments))
             if at is not None and at != thing:
                 yield Impossible(
                     symbol,
-                    f"{hand} is {thing}, but {symbol} is {value}, and {hand.arguments[0]} isn't at it",
-                    "an object that a hand carries stands nowhere",
+                    f"{hand} is {thing}, but {symbol} is {value}, and {hand.arguments[0]} isn't at {value}",
+                    "an object in a hand isn't at a place",
                     f"state {place.name} {in_hand} of {thing}, or another {held.name} of {hand.arguments[0]}",
                 )
 

@@ -201,7 +201,7 @@ class Definitions:
             if not owner:
                 raise KnowledgeError(
                     f"{local_name(iri)} is used as a type, but {local_name(situation)} is a situation type of several classes or "
-                    "of none; let one class have it"
+                    "of no class; let exactly one class have it"
                 )
             return owner
         expression = self._one_definition(iri)
@@ -210,7 +210,7 @@ class Definitions:
             if not _blank(part):
                 return self.base(part)
         raise KnowledgeError(
-            f"{local_name(iri)} is used as a type, but its definition names no class that says what it is one of; "
+            f"{local_name(iri)} is used as a type, but its definition names no class to which its members belong; "
             f"define it as 'SomeClass and (…)'"
         )
 
@@ -220,8 +220,8 @@ class Definitions:
             return (ClassCondition(term, self.names.short(iri), negated),)
         if iri in self.recursive - self.concluded.keys():
             raise KnowledgeError(
-                f"{local_name(iri)} is defined by itself; let a situation type hold of it (c:holdsOf {local_name(iri)}), so that "
-                "who is in it follows step by step, or take it out of its definition",
+                f"{local_name(iri)} is defined by itself; define a situation type with c:holdsOf {local_name(iri)}, which may be "
+                "recursive, or remove {local_name(iri)} from its own definition",
                 iri,
             )
         if iri in self.concluded:
@@ -254,9 +254,7 @@ class Definitions:
     def _one_definition(self, iri: str) -> str:
         found = self._definitions(iri)
         if len(found) != 1:
-            raise KnowledgeError(
-                f"{local_name(iri)} has {len(found)} definitions; a class defined by situations has one"
-            )
+            raise KnowledgeError(f"{local_name(iri)} has {len(found)} definitions; keep one of them")
         return found[0]
 
     # -------------------------------------------------------------------------------------------------------- properties
@@ -317,8 +315,8 @@ class Definitions:
     ) -> Rule:
         if len(kinds) != 2:
             raise KnowledgeError(
-                f"{situation} follows from axioms about its value property, so that it is about two individuals; "
-                "say by c:hasSituationType which class has it"
+                f"{situation} follows from axioms about its value property, so it needs two arguments; "
+                "state by c:hasSituationType which class has it"
             )
         return Rule(situation, (Parameter("?from", kinds[0]), Parameter("?to", kinds[1])), variables, conditions)
 
@@ -329,8 +327,8 @@ class Definitions:
             if kind := self.kinds.get(iri, ("", ""))[at_its_end is not inverse]:
                 return kind
         raise KnowledgeError(
-            f"the chain of {local_name(self._named(one)[0])} and {local_name(self._named(other)[0])} leads over individuals of "
-            "which nothing says the class; write it as a c:Rule with a c:Witness"
+            f"the chain of {local_name(self._named(one)[0])} and {local_name(self._named(other)[0])} leads over individuals "
+            "whose class isn't stated; write the chain as a c:Rule with a c:Witness"
         )
 
     # -------------------------------------------------------------------------------------------------- class expressions
@@ -366,7 +364,7 @@ class Definitions:
             yield self._some(said[OWL + "onProperty"][0], term, said[OWL + "allValuesFrom"][0], outside=True)
         else:
             raise KnowledgeError(
-                "a class defined by situations uses a kind of OWL expression that doesn't become a condition; "
+                "the definition of a class uses an OWL expression that planning doesn't support; "
                 "use and, or, not, value, some, only, min, max, exactly, Self and {…}"
             )
 
@@ -388,7 +386,7 @@ class Definitions:
         if max(least, -1 if most is None else most) > MOST:
             raise KnowledgeError(
                 f"a definition counts up to {max(least, most or 0)} values of {local_name(self._named(prop)[0])}; planning counts "
-                f"up to {MOST}: say it by an amount, which behaviours change"
+                f"only up to {MOST}; use an amount that behaviours change"
             )
         if least:
             yield self._some(prop, term, filler, outside=False, others=least - 1)
@@ -409,7 +407,7 @@ class Definitions:
             within = self._data_range(prop, amount, said[OWL + "allValuesFrom"][0])
             return AnyOf(((replace(there, negated=True),), within))
         raise KnowledgeError(
-            f"a class is defined by how many numbers {local_name(prop)} leads to; an amount is one number: use some or value"
+            f"the definition of a class counts the values of {local_name(prop)}, but an amount has one value; use 'some' or 'value'"
         )
 
     def _data_range(self, prop: str, amount: Expression, node: str) -> tuple[Condition, ...]:
@@ -423,7 +421,7 @@ class Definitions:
                 for name, values in self.nodes.get(facet, {}).items():
                     if local_name(name) not in FACETS:
                         raise KnowledgeError(
-                            f"{local_name(prop)}: the facet {local_name(name)} says nothing of a number"
+                            f"{local_name(prop)}: the facet {local_name(name)} doesn't apply to numbers"
                         )
                     found.append(Comparison(amount, FACETS[local_name(name)], self._exact(prop, values[0])))
             return tuple(found)
@@ -437,7 +435,7 @@ class Definitions:
         if OWL + "datatypeComplementOf" in said:
             return (_negation(self._data_range(prop, amount, said[OWL + "datatypeComplementOf"][0])),)
         raise KnowledgeError(
-            f"a definition restricts {local_name(prop)} by more than comparisons with numbers; use decimal[>= 2]"
+            f"a definition may restrict {local_name(prop)} only by comparisons with numbers; use decimal[>= 2]"
         )
 
     @staticmethod
@@ -481,7 +479,7 @@ class Definitions:
         kind = self.kinds.get(iri, ("", ""))[not inverse]
         if not kind:
             raise KnowledgeError(
-                f"'{local_name(iri)} some' and 'only' need a named class behind them here; name one in the definition"
+                f"'some' and 'only' need a named class after {local_name(iri)}; name a class in the definition"
             )
         return kind
 
@@ -492,7 +490,7 @@ class Definitions:
         if iri not in self.situations:
             if iri not in self.kinds:
                 raise KnowledgeError(
-                    f"{local_name(iri)} stands in a definition, but is neither a value property nor a relation; "
+                    f"a definition uses {local_name(iri)}, which is neither a value property nor a relation; "
                     "declare it as a c:Relation, or correct the name"
                 )
             return RelationCondition(self.names.short(iri), (one, other))
@@ -514,7 +512,7 @@ class Definitions:
         while rests != [RDF + "nil"]:
             cell = self.nodes.get(rests[0], {})
             if len(rests) != 1 or rests[0] in seen or len(cell.get(RDF + "first", ())) != 1:
-                raise KnowledgeError(f"the list of an owl:{name} isn't whole; write it as ( … )")
+                raise KnowledgeError(f"the list of an owl:{name} is incomplete; write it as ( … )")
             seen.add(rests[0])
             found += cell[RDF + "first"]
             rests = list(cell.get(RDF + "rest", []))

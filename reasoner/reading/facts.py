@@ -63,7 +63,7 @@ def facts_of(
             stated[symbol].add(said if amount is None else written(amount))
     for symbol in stated:
         if symbol.situation not in domain.situations:
-            raise KnowledgeError(f"{symbol}: a fact of no known situation type")
+            raise KnowledgeError(f"the situation type of the fact {symbol} is unknown")
         if symbol.situation in domain.aggregates:
             raise KnowledgeError(
                 f"{symbol} is stated, but a rule defines it; drop the fact, or the rule of {symbol.situation}",
@@ -116,7 +116,9 @@ def individuals_named(domain: Domain, names: Names) -> dict[str, int]:
 def _check_numbers(relation: str, rows: Iterable[tuple[str, ...]], bare: Collection[tuple[str, ...]]) -> None:
     """Raise `KnowledgeError` if a relation has two numbers for the same individuals, or a number for only some individuals."""
     for row in bare:
-        raise KnowledgeError(f"{relation} of {', '.join(row)} has no number, where others have one; say its c:amount")
+        raise KnowledgeError(
+            f"{relation} of {', '.join(row)} has no number, but other facts of {relation} have one; state its c:amount"
+        )
     found: dict[tuple[str, ...], str] = {}
     for *individuals, value in sorted(rows):
         if (old := found.setdefault(tuple(individuals), value)) != value:
@@ -141,7 +143,9 @@ def initial_state(
             values = sorted(stated.get(symbol, ())) or [v for v in [situation.default] if v]
             if len(values) != 1:
                 what = f"several values ({', '.join(values)})" if values else "no value"
-                raise KnowledgeError(f"{symbol} has {what}; state one in the scene, or a default of {situation.name}")
+                raise KnowledgeError(
+                    f"{symbol} has {what}; state a value in the scene, or a default of {situation.name}"
+                )
             initial[symbol] = values[0]
     members = {kind: frozenset(those) for kind, those in classes.items()}
     for symbol in sorted(

@@ -213,7 +213,7 @@ def _rules(parts: Parts, schema: Schema, situations: Mapping[str, SituationType]
         rules = [parts.rule(rule, kinds) for rule in written[iri]] + by_swrl.get(iri, [])
         if said and len(kinds) != 1:
             raise KnowledgeError(
-                f"<{iri}> holds for the members of a class, so it has one argument, and {len(kinds)} are stated; "
+                f"<{iri}> has c:holdsOf, so it needs one argument, but {len(kinds)} are stated; "
                 "state by c:hasSituationType which class has it"
             )
         for kind in said:
@@ -260,7 +260,7 @@ def _aggregates(
         for effect in schema.of_kind("AmountEffect"):
             if list(parts.values(effect, "situationType")) == [situation]:
                 raise KnowledgeError(
-                    f"<{effect}> changes {name}, which is defined by <{iri}>; take the effect out, or drop the rule",
+                    f"<{effect}> changes {name}, which is defined by <{iri}>; remove the effect, or drop the rule",
                     effect,
                 )
         try:
@@ -270,7 +270,7 @@ def _aggregates(
         quantity = situations[name].quantity
         if quantity is not None and quantity.bounded and not found[name].kept:
             raise KnowledgeError(
-                f"{name} is a {found[name].function} with bounds, which no behaviour would keep; "
+                f"{name} is a {found[name].function} with bounds, but planning can't enforce these bounds; "
                 "let the behaviours require a comparison instead",
                 situation,
             )
@@ -394,12 +394,12 @@ def _check_behavior(behavior: Behavior, domain: Domain) -> None:
         situation = domain.situations[part.situation]
         if len(part.arguments) != len(situation.arguments):
             raise KnowledgeError(
-                f"{behavior.name} speaks of {part.situation} with {len(part.arguments)} arguments; it has "
-                f"{len(situation.arguments)}: correct the condition or effect, or say what has that situation type"
+                f"{behavior.name} uses {part.situation} with {len(part.arguments)} arguments, but it has "
+                f"{len(situation.arguments)}: correct the condition or effect, or state which class has that situation type"
             )
         if situation.level > behavior.level:
             raise KnowledgeError(
-                f"{behavior.name} on level {behavior.level} speaks of {part.situation}, which exists from level "
+                f"{behavior.name} on level {behavior.level} uses {part.situation}, but this situation type exists only from level "
                 f"{situation.level} on; correct the behaviour's c:level or the situation type's c:fromLevel"
             )
 

@@ -61,7 +61,7 @@ def with_goals(problem: Problem, goals: Iterable[str]) -> Problem:
                 f"'{fact}': {symbol.situation} is a {aggregate.function}; state such a goal in the scene, as a c:Comparison"
             )
         if given.setdefault(symbol, value) != value:
-            raise KnowledgeError(f"two goals for {symbol}: {given[symbol]} and {value}; give one")
+            raise KnowledgeError(f"there are two goals for {symbol}: {given[symbol]} and {value}; give only one")
     weights = {symbol: weight for symbol, weight in problem.weights.items() if symbol not in given}
     return replace(problem, goal=dict(sorted({**problem.goal, **given}.items())), weights=weights)
 
@@ -161,7 +161,7 @@ def with_task(problem: Problem, parts: Parts, tasks: Iterable[str]) -> Problem:
                 symbol, value = _bounds(iri, wanted)
                 if symbol in goal and weights.get(symbol) != weight:
                     raise KnowledgeError(
-                        f"<{iri}>: {symbol} has another goal with another weight; give both the same c:weight"
+                        f"<{iri}>: two goals for {symbol} have different weights; give both the same c:weight"
                     )
                 value = bounds_written(f"{goal[symbol]},{value}" if symbol in goal else value)
                 goal[symbol] = value
@@ -179,7 +179,9 @@ def with_task(problem: Problem, parts: Parts, tasks: Iterable[str]) -> Problem:
                 continue  # the symbol doesn't exist
             weights |= {} if weight is None else {symbol: weight}
             if goal.setdefault(symbol, value) != value:
-                raise KnowledgeError(f"{symbol} is wanted to be both {goal[symbol]} and {value}; drop one of the goals")
+                raise KnowledgeError(
+                    f"two goals require that {symbol} is {goal[symbol]} and {value}; drop one of the goals"
+                )
             if symbol not in problem.initial and not problem.domain.situations[symbol.situation].boolean:
                 raise KnowledgeError(
                     f"<{iri}>: there is no {symbol}; the object or its situation type isn't in the scene"
@@ -252,8 +254,9 @@ def _wanted_value(iri: str, symbol: Symbol, wanted: ValueCondition, problem: Pro
     left = [value for value in problem.values(symbol, level) if value != wanted.value]
     if len(left) != 1:
         raise KnowledgeError(
-            f"<{iri}>: the goal excludes a value of {wanted.situation}, and leaves {some_of(left) or 'none'}; state the wanted "
-            "value, or several of them as alternatives (c:AnyOf)"
+            f"<{iri}>: the goal excludes a value of {wanted.situation}; the remaining values are {some_of(left) or 'none'}; "
+            "state the "
+            "wanted value, or several values as alternatives (c:AnyOf)"
         )
     return left[0]
 
@@ -270,8 +273,8 @@ def _wanted(parts: Parts, iri: str, classes: Mapping[str, tuple[str, ...]]) -> l
         *others, _ = found.conditions
         if others:
             raise KnowledgeError(
-                f"<{iri}> wants something of all of a class whose individuals change; name a class that situations don't define, "
-                "or want a situation type that is defined"
+                f"<{iri}> is a goal about all individuals of a class that situations define; name another class, "
+                "or state the goal with a defined situation type"
             )
         wanted = [
             substituted(one.conditions[-1], {one.variable: member})
@@ -288,7 +291,9 @@ def _bounds(iri: str, wanted: Comparison) -> tuple[Symbol, str]:
     contrary = {"<": ">=", "<=": ">", ">=": "<", ">": "<="}
     sign = contrary.get(wanted.operator, "") if wanted.negated else wanted.operator
     if not sign or not isinstance(wanted.left, Amount) or not isinstance(wanted.right, Fraction):
-        raise KnowledgeError(f"<{iri}>: a goal compares the amount of one object with a number, as <, <=, =, >= or >")
+        raise KnowledgeError(
+            f"<{iri}>: a goal with a comparison compares the amount of one object with a number, by <, <=, =, >= or >"
+        )
     symbol = Symbol(wanted.left.situation, wanted.left.arguments)
     return symbol, f"{sign}{written(wanted.right)}"
 

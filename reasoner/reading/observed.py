@@ -74,7 +74,7 @@ def load_observed(path: Path, reading: Reading) -> Reading:
         symbol = _symbol(iri, node, reading.problem.initial, path)
         if (other := seen.setdefault(symbol, node["value"])) != node["value"]:
             raise KnowledgeError(
-                f"{path}: {symbol} is {other} and {node['value']}, which can't both be seen (a memory says what may be); "
+                f"{path}: {symbol} is {other} and {node['value']}, but only one of the two can be observed; "
                 "give the file that 'confab run' or 'confab execute' wrote"
             )
     problem = reading.problem
@@ -82,7 +82,7 @@ def load_observed(path: Path, reading: Reading) -> Reading:
     try:
         refuse_impossible(problem, problem.initial, now, str(path))
     except ImpossibleStateError as error:
-        raise KnowledgeError(f"{error}; observe this scene anew") from error
+        raise KnowledgeError(f"{error}; observe this scene again") from error
     return replace(reading, problem=replace(problem, initial=now))
 
 
@@ -95,9 +95,7 @@ def _symbol(iri: str, node: Mapping[str, str], known: State, path: Path) -> Symb
     arguments = tuple(node[name] for name in ARGUMENTS if name in node)
     symbol = Symbol(node.get("situationType", ""), arguments)
     if symbol not in known or "value" not in node:
-        raise KnowledgeError(
-            f"{path}: <{iri}> speaks of {symbol}, which the scene doesn't have; observe this scene anew"
-        )
+        raise KnowledgeError(f"{path}: <{iri}> names {symbol}, which the scene doesn't have; observe this scene again")
     return symbol
 
 

@@ -126,7 +126,9 @@ class Parts(NodeReader):
         """Return the situation type of a condition, an effect or a calculation."""
         situation = self.one(iri, "situationType")
         if not self.is_a(situation, "SituationType"):
-            raise KnowledgeError(f"<{iri}>: <{situation}> is no situation type; declare it as one, or correct the name")
+            raise KnowledgeError(
+                f"<{iri}>: <{situation}> isn't a situation type; declare it as one, or correct the name"
+            )
         return situation
 
     def symbol(self, iri: str) -> tuple[str, tuple[str, ...], str]:
@@ -134,7 +136,7 @@ class Parts(NodeReader):
         situation = self.situation(iri)
         if self.is_a(situation, "Amount"):
             raise KnowledgeError(
-                f"<{iri}>: {local_name(situation)} is an amount, which no value condition or effect speaks of; "
+                f"<{iri}>: {local_name(situation)} is an amount, but a value condition or value effect can't be about an amount; "
                 "use a c:Comparison or a c:AmountEffect"
             )
         arguments = self.arguments(iri)
@@ -147,7 +149,7 @@ class Parts(NodeReader):
         """Return the relation of a condition or a calculation."""
         relation = self.one(iri, "relation")
         if not self.is_a(relation, "Relation", "ReachRelation"):
-            raise KnowledgeError(f"<{iri}>: <{relation}> is no relation; declare it as one, or correct the name")
+            raise KnowledgeError(f"<{iri}>: <{relation}> isn't a relation; declare it as one, or correct the name")
         return self.names.short(relation)
 
     def of_class(self, term: str, kind: str, negated: bool) -> Condition:
@@ -159,7 +161,7 @@ class Parts(NodeReader):
         found = super().measured(iri)
         if isinstance(found, Amount) and not self.is_a(situation := self.situation(iri), "Amount"):
             raise KnowledgeError(
-                f"<{iri}>: {local_name(situation)} is no amount, so that no number compares with it or changes it; "
+                f"<{iri}>: {local_name(situation)} isn't an amount, so it can't be compared with a number or changed by a number; "
                 "declare it as c:Amount, or use a value condition or effect"
             )
         return found
@@ -170,14 +172,14 @@ class Parts(NodeReader):
         found = [value for value in said if value in self.individuals_of and value not in self.standing]
         if twice := [kind for kind in found if found.count(kind) > 1]:
             raise KnowledgeError(
-                f"<{iri}> names the class {local_name(twice[0])} twice, so that it can't be told whether the same individual is "
-                "meant; use a c:Witness with a variable for one of them"
+                f"<{iri}> names the class {local_name(twice[0])} twice, so it is unclear whether both mean the same individual; "
+                "use a c:Witness with a variable for one of them"
             )
         situation = self.values(iri, "situationType")[:1]
         if found and found[-1:] == [*self.values(iri, "value")] and situation and situation[0] not in self.pairs:
             raise KnowledgeError(
-                f"<{iri}> wants every {local_name(found[-1])} as the one value of {local_name(situation[0])}; name an individual, "
-                "or seek some one by a c:Witness"
+                f"<{iri}> has the class {local_name(found[-1])} as the value of {local_name(situation[0])}; name an individual, "
+                "or use a c:Witness for some individual of the class"
             )
         return found
 
@@ -211,7 +213,8 @@ class Parts(NodeReader):
         kinds = self.classes_in(iri)
         if len(kinds) > 1:
             raise KnowledgeError(
-                f"<{iri}> is about all of two classes, {' and '.join(map(local_name, kinds))}; make one of them a parameter"
+                f"<{iri}> is about all individuals of two classes, {' and '.join(map(local_name, kinds))}; make one of them "
+                "a parameter"
             )
         for kind in kinds:
             self.standing[kind] = "?each"
@@ -306,7 +309,10 @@ class Parts(NodeReader):
         """
         situation, arguments, value = self.symbol(iri)
         if value != TRUE:
-            raise KnowledgeError(f"<{iri}>: a rule says what is true; leave out the value, or negate its conditions")
+            raise KnowledgeError(
+                f"<{iri}>: a rule can only conclude that a situation is true; leave out the value, or "
+                "negate its conditions"
+            )
         parameters, variables, conditions = self.head_and_body(iri, situation, arguments, kinds)
         return Rule(situation, parameters, variables, conditions)
 
@@ -317,7 +323,7 @@ class Parts(NodeReader):
             raise KnowledgeError(f"<{iri}>: a static relation isn't derived; make it a c:Amount")
         if function == "count" and (self.values(iri, "right") or self.values(iri, "amount")):
             raise KnowledgeError(
-                f"<{iri}> counts, and names a number besides; drop it, or aggregate by sum, max or min"
+                f"<{iri}> counts individuals, but also names a number; drop the number, or use the aggregate sum, max or min"
             )
         number = Fraction(1) if function == "count" else self.right(iri)
         parameters, variables, conditions = self.head_and_body(iri, derived.situation, derived.arguments, kinds)
@@ -326,7 +332,7 @@ class Parts(NodeReader):
         counted = tuple(one for one in variables if one.name in over)
         if not counted:
             raise KnowledgeError(
-                f"<{iri}> aggregates over nothing; let c:over name the variable that it counts or adds up"
+                f"<{iri}> has an aggregate without a variable; let c:over name the variable that it counts or adds up"
             )
         bound = frozenset(one.name for one in (*parameters, *counted))
         asked = closed(conditions, bound, {one.name: one.kind for one in (*parameters, *variables)})

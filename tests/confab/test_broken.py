@@ -342,7 +342,7 @@ def test_plain_entities_still_abbreviate(tmp_path: Path) -> None:
             "",
             ":PLACE a ",
             ":PLACE c:fromLevel 3 . :PLACE a ",
-            "B1_CARRY on level 1 speaks of PLACE, which exists from level 3",
+            "B1_CARRY on level 1 uses PLACE, but this situation type exists only from level 3",
         ),
         (
             "",
@@ -352,7 +352,7 @@ def test_plain_entities_still_abbreviate(tmp_path: Path) -> None:
         ),
         ("", "c:postcondition :B1_CARRY.carried", "c:postcondition :B1_CARRY.carry", "carry> is used as an effect but"),
         ("", ":PLACE ; c:value :B1_CARRY.place", ":PLAZE ; c:value :B1_CARRY.place", "PLAZE> is no situation type"),
-        ("", "c:about :B1_CARRY.item ; ", "", "B1_CARRY speaks of PLACE with 0 arguments; it has 1"),
+        ("", "c:about :B1_CARRY.item ; ", "", "B1_CARRY uses PLACE with 0 arguments, but it has 1"),
         ("", "c:value :dirty", "c:value :dirt", "tearoom#dirt> is named in a behaviour, but isn't declared"),
         ("", "c:AbsenceCondition ;", 'c:AbsenceCondition ; c:negated "perhaps" ;', "c:negated is 'perhaps'"),
         ("", ":B1_CARRY.free ;", ":N . :N a c:AnyOf ; c:alternative :N . :B1_CARRY", "the condition contains itself"),
@@ -404,7 +404,7 @@ def test_an_amount_that_is_no_situation_type_is_refused(tmp_path: Path, ask: Ask
     )
     code, out, err = ask("plan", scene)
     assert (code, out, err.count("\n")) == (MISUSE, "", 1)
-    assert "canteen#BATTERY> is no situation type; declare it as one" in err
+    assert "canteen#BATTERY> isn't a situation type; declare it as one" in err
 
 
 def test_what_follows_from_axioms_about_a_property_has_an_owner(tmp_path: Path, ask: Ask) -> None:

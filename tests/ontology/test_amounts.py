@@ -32,7 +32,7 @@ def canteen(tmp_path: Path) -> Callable[[str, str], Path]:
         ("d:servings 1.5", "d:servings -1.5", "<jug1, SERVINGS> is -1.5; it has to be at least 0"),
         ("d:battery 6.0", "d:battery 26.0", "<trolley, BATTERY> is 26; it has to be at least 0 and at most 20"),
         (':battery ; c:fromLevel 2 ; c:unit "Wh"', ':battery ; c:fromLevel 2 ; c:unit "min"', "min and Wh ("),
-        (':BATTERY ; c:sign "<"', ':TROLLEY_AT ; c:sign "<"', "TROLLEY_AT is no amount, so that no number compares with it"),
+        (':BATTERY ; c:sign "<"', ':TROLLEY_AT ; c:sign "<"', "TROLLEY_AT isn't an amount, so it can't be compared with a number"),
         ('c:change "assign"', 'c:change "set"', "has no kind of change, several kinds, or an invalid kind"),
         ('c:sign "<" ; c:amount 20.0', 'c:sign "<"', "L2_CHARGE.notFull> has neither c:amount nor c:right"),
         ("owl:NamedIndividual, c:SituationType, c:Amount", "owl:NamedIndividual, c:SituationType", "isn't declared as an amount"),
@@ -58,7 +58,7 @@ def test_a_fault_in_amounts_is_found_with_its_node_and_its_mend(
         (
             "c:argument2 d:dock ; c:amount 2.0 .",
             "c:argument2 d:dock .",
-            "WAY of tap, dock has no number, where others have one",
+            "WAY of tap, dock has no number, but other facts of WAY have one",
         ),
     ],
 )

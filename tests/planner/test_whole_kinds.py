@@ -102,8 +102,8 @@ def test_the_theatre_is_valid() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        (":Prop ; c:situationType :AT ; c:value :stage", ":Prop ; c:situationType :AT ; c:value :Room", "wants every Room as the"),
-        ("d:Prop ; c:situationType d:STOWED", "d:Stowed ; c:situationType d:STOWED", "of all of a class whose individuals change"),
+        (":Prop ; c:situationType :AT ; c:value :stage", ":Prop ; c:situationType :AT ; c:value :Room", "the class Room as the"),
+        ("d:Prop ; c:situationType d:STOWED", "d:Stowed ; c:situationType d:STOWED", "a class that situations define"),
         (":Prop ; c:situationType :STOWED ;", ":Prop ; c:situationType :LADEN ; c:value :Prop ;", "names the class Prop twice"),
     ],
 )  # fmt: skip

@@ -178,7 +178,7 @@ def test_a_property_that_is_neither_situation_nor_relation_is_refused_by_name(tm
     there = restriction(":liesBy", "owl:someValuesFrom :Sink")
     path = scene(tmp_path, ":liesBy a owl:ObjectProperty . " + defined(both(":Item", IS_DIRTY, there)))
     with pytest.raises(
-        KnowledgeError, match="liesBy stands in a definition, but is neither a value property nor a relation"
+        KnowledgeError, match="a definition uses liesBy, which is neither a value property nor a relation"
     ):
         read(load(path))
 

@@ -54,7 +54,7 @@ def test_a_value_that_nothing_has_is_not_observed(tmp_path: Path) -> None:
     save_observed(tmp_path / "observed.ttl", {CUP2: "location8"}, reading.names, graph.scene)
     text = (tmp_path / "observed.ttl").read_text()
     (tmp_path / "observed.ttl").write_text(text.replace("#location8>", "#location88>"))
-    with pytest.raises(KnowledgeError, match=r"observed.ttl: .*location88 isn't declared.*; observe this scene anew"):
+    with pytest.raises(KnowledgeError, match=r"observed.ttl: .*location88 isn't declared.*; observe this scene again"):
         load_observed(tmp_path / "observed.ttl", reading)
 
 
@@ -63,5 +63,5 @@ def test_a_file_that_says_what_may_be_is_not_what_was_seen(tmp_path: Path) -> No
     reading = read(graph)
     links = Links({("B1_MOVE", ("cup2", "location5")): {CUP2: {"location1": 0.5, "location8": 0.5}}})
     save_links(tmp_path / "memory.ttl", links, reading.names, graph.scene)
-    with pytest.raises(KnowledgeError, match="is location1 and location8, which can't both be seen"):
+    with pytest.raises(KnowledgeError, match="is location1 and location8, but only one of the two can be observed"):
         load_observed(tmp_path / "memory.ttl", reading)

@@ -145,7 +145,7 @@ def test_a_rule_that_planning_doesnt_evaluate_is_refused_with_its_mend(yard: Yar
 def test_a_class_counts_up_to_five(yard: Yard) -> None:
     path = yard("")
     path.write_text(path.read_text().replace('"2"^^xsd:nonNegativeInteger', '"9"^^xsd:nonNegativeInteger'))
-    with pytest.raises(KnowledgeError, match=r"counts up to 9 values of \w+; planning counts up to 5"):
+    with pytest.raises(KnowledgeError, match=r"counts up to 9 values of \w+; planning counts only up to 5"):
         read(load(path))
 
 
@@ -170,7 +170,7 @@ def test_a_class_that_is_defined_by_itself_is_followed_step_by_step(yard: Yard) 
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        (KEPT.format(held="Other", inner="Kept", other=":Kept"), "Kept is defined by itself; let a situation type hold of it"),
+        (KEPT.format(held="Other", inner="Kept", other=":Kept"), "Kept is defined by itself; define a situation type"),
         (
             KEPT.format(held="Kept", inner="Other", other="[ a owl:Class ; owl:complementOf :Kept ]")
             + ":OTHER a owl:NamedIndividual, c:SituationType ; c:holdsOf :Other . :Thing c:hasSituationType :OTHER .",

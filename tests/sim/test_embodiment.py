@@ -51,7 +51,7 @@ def changed(subject: str, name: str, value: ox.Literal | None) -> ox.Store:
         (BODIES + "cup_shape", "mass", None, "cup_shape has no e:mass"),
         (BODIES + "cup_shape", "graspHeight", ox.Literal("high"), "graspHeight 'high'; wanted numbers"),
         (BODIES + "cup_shape", "color", ox.Literal("1 0 0"), "wanted red, green, blue and opacity"),
-        ("https://w3id.org/confab/two-arms#two_arms", "urdf", ox.Literal("robots/none.urdf"), "which is in none of"),
+        ("https://w3id.org/confab/two-arms#two_arms", "urdf", ox.Literal("robots/none.urdf"), "but this file isn't in"),
         ("https://w3id.org/confab/two-arms#left_hand", "homePosture", ox.Literal("0 0"), "7 e:armJoints and 2 angles"),
     ],
 )
