@@ -13,7 +13,7 @@ from confab.reasoner.reading.observed import load_observed, save_observed
 from confab.reasoner.symbols import Fact, Symbol
 from confab.reasoner.validation.validate import validate
 
-TWICE = "cup1 and cup2 have the same LOCATION, location1; state another LOCATION of one of them"
+TWICE = "cup1 and cup2 have the same LOCATION, location1; state another LOCATION of one of the two"
 HELD = "<left_hand, HOLDS> is cup1, but <cup1, LOCATION> is location2, and left_hand isn't at location2"
 NOBODY = "<cup1, LOCATION> is in_hand, but no Hand has cup1 as its HOLDS"
 WRONG = [("cup1 LOCATION location1", TWICE), ("left_hand HOLDS cup1", HELD), ("cup1 LOCATION in_hand", NOBODY)]
