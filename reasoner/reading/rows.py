@@ -142,11 +142,11 @@ def link(row: Sequence[Term], blank: bool = False) -> Triple:
     if text(predicate) in OF_ONTOLOGIES:
         said = local_name(text(predicate))
         raise KnowledgeError(
-            f"<{text(subject)}>: {said} is said of an ontology, not of an individual; move it beside owl:imports"
+            f"<{text(subject)}>: {said} belongs to an ontology, not to an individual; move it beside owl:imports"
         )
     for term in (subject, value):
         if not (isinstance(term, ox.NamedNode) or (blank and isinstance(term, ox.BlankNode))):
-            what = f"'{text(term)[:60]}', a text" if isinstance(term, ox.Literal) else "something without a name"
+            what = f"the text '{text(term)[:60]}'" if isinstance(term, ox.Literal) else "a node without a name"
             raise KnowledgeError(
                 f"<{text(subject)}>: {local_name(text(predicate))} has {what} as its value; name an individual instead"
                 + (", without quotation marks" if isinstance(term, ox.Literal) else "")

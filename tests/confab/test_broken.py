@@ -315,9 +315,9 @@ def test_plain_entities_still_abbreviate(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("file", "old", "new", "said"),
     [
-        ("-scene", "d:isAt :table", 'd:isAt "table"', "isAt leads to 'table', a text, where an individual belongs"),
-        ("-scene", "d:isAt :table", "d:isAt [ a d:Place ]", "something without a name"),
-        ("-scene", "c:value :table", 'c:value "table"', "a text, where an individual belongs"),
+        ("-scene", "d:isAt :table", 'd:isAt "table"', "isAt has the text 'table' as its value"),
+        ("-scene", "d:isAt :table", "d:isAt [ a d:Place ]", "a node without a name"),
+        ("-scene", "c:value :table", 'c:value "table"', "value has the text 'table' as its value"),
         ("-scene", "c:index 1", 'c:index "one"', "c:index is 'one'; wanted a whole number"),
         ("-scene", "c:situationType d:PLACE ; ", "", "wanted one c:situationType, found 0"),
         ("-scene", "d:isAt :table", "d:isAt :tabel", "tabel isn't declared as an individual; declare it"),
@@ -351,7 +351,7 @@ def test_plain_entities_still_abbreviate(tmp_path: Path) -> None:
             "B1_CARRY.fre> is used as a condition but",
         ),
         ("", "c:postcondition :B1_CARRY.carried", "c:postcondition :B1_CARRY.carry", "carry> is used as an effect but"),
-        ("", ":PLACE ; c:value :B1_CARRY.place", ":PLAZE ; c:value :B1_CARRY.place", "PLAZE> is no situation type"),
+        ("", ":PLACE ; c:value :B1_CARRY.place", ":PLAZE ; c:value :B1_CARRY.place", "PLAZE> isn't a situation type"),
         ("", "c:about :B1_CARRY.item ; ", "", "B1_CARRY uses PLACE with 0 arguments, but it has 1"),
         ("", "c:value :dirty", "c:value :dirt", "tearoom#dirt> is named in a behaviour, but isn't declared"),
         ("", "c:AbsenceCondition ;", 'c:AbsenceCondition ; c:negated "perhaps" ;', "c:negated is 'perhaps'"),
