@@ -247,7 +247,7 @@ def solved(domain: str, problem: str, engine: str | None, seconds: float | None)
 def _tell(engine: str, deadline: Deadline) -> None:
     """Log the name of the engine and its time limit."""
     limit = "" if deadline.left is None else f", for up to {deadline.left:.3g} s (--time-limit)"
-    log.warning("confab: the engine %s is asked for a plan%s; --engine none asks none", engine, limit)
+    log.warning("confab: trying the engine %s%s; with --engine none, Confab tries no engine", engine, limit)
 
 
 def _directly(planner: Any, domain: str, problem: str, deadline: Deadline) -> tuple[str, list[str]]:

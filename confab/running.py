@@ -143,7 +143,7 @@ def persuaded(scene: Scene, result: Result, job: Job, plan: Callable[[Scene], Re
     report = verified(scene, result, job)
     while refuted := refuted_in(scene, report):
         known = knowing(scene, refuted)
-        tell(f"refuted: {refuted[-1]}; planning anew")
+        tell(f"refuted: {refuted[-1]}; planning again")
         another = plan(known)
         if another.outcome.plan is None or another.plan.primitives == result.plan.primitives:
             break

@@ -130,7 +130,8 @@ def _put(engine: Engine, name: str, place: str, perturb: Perturbation | None) ->
             return
         pybullet.removeBody(body, physicsClientId=engine.client)
     raise ValueError(
-        f"{name} is {depth * 1000:.0f} mm inside {inside} at first, at {place}; move one of the two (confab validate finds them)"
+        f"{name} is {depth * 1000:.0f} mm inside {inside} initially, at {place}; move one of the two (confab validate finds "
+        "such overlaps)"
     )
 
 

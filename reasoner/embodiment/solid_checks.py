@@ -150,7 +150,7 @@ def overlapping_at_first(embodiment: Embodiment, initial: State) -> Iterator[Fla
         places = [f"{name} is at {where[name]}" for name in (first.owner, second.owner) if name in where]
         yield (
             first.owner,
-            f"{first.name} is {deep * 1000:.0f} mm inside {second.name} at first",
+            f"{first.name} is {deep * 1000:.0f} mm inside {second.name} initially",
             f"{' and '.join(places)}: two solids in one place, which physics would push apart",
             f"move the places apart by {deep * 1000:.0f} mm or more, or begin with {first.owner} at another place",
         )

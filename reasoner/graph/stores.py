@@ -168,7 +168,7 @@ class Endpoint:
         """
         for (body, accept), digest in self.noted.items():
             if _digest(self._post(body, accept)[0]) != digest:
-                raise KnowledgeError(f"{self.url}: the data changed since it was read; open the scene anew")
+                raise KnowledgeError(f"{self.url}: the data have changed since they were read; load the scene again")
 
     def _post(self, body: bytes, accept: str) -> tuple[bytes, str]:
         """Return the content and the media type of the response to a request."""

@@ -258,7 +258,7 @@ def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: 
     if head["memoryFormat"] != [str(FORMAT)]:
         raise KnowledgeError(
             f"{source}: memory of format {', '.join(head['memoryFormat'])}, wanted {FORMAT}: this version doesn't read it; "
-            "learn anew, or use the version of Confab that wrote it"
+            "learn again, or use the version of Confab that wrote it"
         )
     if "learnsAs" not in head:
         raise KnowledgeError(f"{source}: broken memory: :learnsAs, the ID of its replica, is missing; restore a copy")

@@ -343,7 +343,7 @@ class Parts(NodeReader):
     ) -> tuple[tuple[Parameter, ...], tuple[Parameter, ...], tuple[Condition, ...]]:
         """Return the parameters, the other variables and the conditions of a rule."""
         if len(arguments) != len(kinds):
-            raise KnowledgeError(f"<{iri}> speaks of {situation} with {len(arguments)} arguments; it has {len(kinds)}")
+            raise KnowledgeError(f"<{iri}> uses {situation} with {len(arguments)} arguments, but it has {len(kinds)}")
         parameters: list[Parameter] = []
         compared: list[Condition] = []
         own = {self.term(t): t for t in self.terms_below(iri)}

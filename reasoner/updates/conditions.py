@@ -94,7 +94,7 @@ class Conditions:
             "OptionalGraphPattern": "write an effect for some only as a further operation, behind a semicolon",
         }
         raise UpdateError(
-            f"{part.name.removesuffix('GraphPattern').upper()} isn't read here",
+            f"{part.name.removesuffix('GraphPattern').upper()} isn't supported",
             advice.get(part.name, "write patterns, FILTER, UNION and VALUES"),
             place(part),
         )
@@ -131,7 +131,7 @@ class Conditions:
             equal = [self.equal(one.expr, other, one.op == "NOT IN", known) for other in one.other]
             return equal if one.op == "NOT IN" else [self.any_of([[node] for node in equal], place(one))]
         raise UpdateError(
-            "this FILTER isn't read here",
+            "this FILTER isn't supported",
             "compare two terms by = or !=, IN, or write EXISTS, NOT EXISTS, &&, || or !",
             place(one),
         )

@@ -175,7 +175,7 @@ def _aggregated(head: Triple, select: Any) -> Construction:
         )
     if inner.distinct:
         raise UpdateError(
-            "DISTINCT isn't read here", "seek what shall not be counted by FILTER EXISTS { … }", computed[0].evar.at
+            "DISTINCT isn't supported", "seek what shall not be counted by FILTER EXISTS { … }", computed[0].evar.at
         )
     argument = None if found[1] == "Count" else inner.vars
     return Construction(
@@ -206,7 +206,7 @@ def _prefixes(prologues: Iterable[Any]) -> dict[str, str]:
     for prologue in prologues:
         for declared in prologue:
             if declared.name == "Base":
-                raise UpdateError("BASE isn't read here", "write whole IRIs, or PREFIX lines", 0)
+                raise UpdateError("BASE isn't supported", "write whole IRIs, or PREFIX lines", 0)
             prefixes[str(declared.prefix or "")] = str(declared.iri).strip("<>")
     return prefixes
 
@@ -298,14 +298,14 @@ def _least(triples: Sequence[Triple], otherwise: int) -> int:
 
 def _quads(quads: Any) -> list[Triple]:
     if quads.quadsNotTriples:
-        raise UpdateError("GRAPH isn't read here", "a behaviour speaks of one situation; leave GRAPH out", 0)
+        raise UpdateError("GRAPH isn't supported", "leave GRAPH out, since a behaviour is about one situation", 0)
     return [triple for block in quads.triples or () for triple in triples(block)]
 
 
 def parts(group: Any) -> Sequence[Any]:
     """Return the parts of a group graph pattern."""
     if group.name == "SubSelect":
-        raise UpdateError("a SELECT inside isn't read here", "write its patterns themselves", 0)
+        raise UpdateError("a SELECT inside isn't supported", "write its patterns themselves", 0)
     return group.part or ()
 
 
@@ -370,10 +370,10 @@ def _predicate(path: Any) -> Word:
     while not isinstance(path, Word):
         inner = path.part if isinstance(path.part, Word) else (path.part or [None])
         if path.mod or path.name == "PathEltOrInverse" or (not isinstance(inner, Word) and len(inner) != 1):
-            raise UpdateError("a path isn't read here", "write a pattern for each step of it", place(path))
+            raise UpdateError("a path isn't supported", "write a pattern for each step of it", place(path))
         path = inner if isinstance(inner, Word) else inner[0]
         if path is None:
-            raise UpdateError("a path isn't read here", "write a pattern for each step of it", 0)
+            raise UpdateError("a path isn't supported", "write a pattern for each step of it", 0)
     return path
 
 

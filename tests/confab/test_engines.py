@@ -203,7 +203,7 @@ def test_which_engine_is_asked_is_said_with_its_limit(
     monkeypatch.undo()
     monkeypatch.setattr(engines, "_directly", lambda *_: ("TIMEOUT", []))
     plan_by_engine(confab.load(SCENE).problem, None)
-    assert re.search(r"the engine fast-downward is asked for a plan, for up to [56]\d", caplog.text)
+    assert re.search(r"trying the engine fast-downward, for up to [56]\d", caplog.text)
 
 
 def test_what_exporting_takes_is_taken_from_the_engines_time(monkeypatch: pytest.MonkeyPatch) -> None:

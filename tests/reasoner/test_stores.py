@@ -292,7 +292,7 @@ def test_data_that_change_while_they_are_read_are_never_planned_with(
             return post(self, body, accept)
 
         monkeypatch.setattr(Endpoint, "_post", meddled)
-        with pytest.raises(KnowledgeError, match=r"changed since it was read; open the scene anew"):
+        with pytest.raises(KnowledgeError, match=r"changed since they were read; load the scene again"):
             confab.load(url).plan()
         with pytest.raises(KnowledgeError, match="no task with goals"):
             confab.load(url).plan()

@@ -28,7 +28,7 @@ def test_a_tray_that_stands_through_the_back_of_its_cabinet_is_refused_with_part
 
 
 def test_blocks_that_overlap_at_first_are_refused_with_their_names_and_millimetres() -> None:
-    assert findings("overlap.ttl") == [("overlapping-at-first", "a is 25 mm inside b at first")]
+    assert findings("overlap.ttl") == [("overlapping-at-first", "a is 25 mm inside b initially")]
 
 
 def changed(embodiment: Embodiment, name: str, **new: object) -> list[str]:
@@ -80,7 +80,7 @@ def test_a_link_behind_a_shut_neighbour_is_no_fault_since_the_neighbour_opens() 
     ("file", "said"),
     [
         ("through.ttl", "tray is 29 mm inside cab while the joints of cab are at 0"),
-        ("overlap.ttl", "b is 25 mm inside a at first, at p2"),
+        ("overlap.ttl", "b is 25 mm inside a initially, at p2"),
     ],
 )
 def test_a_world_in_which_solids_overlap_at_first_is_not_begun(file: str, said: str) -> None:
