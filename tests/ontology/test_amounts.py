@@ -38,7 +38,7 @@ def canteen(tmp_path: Path) -> Callable[[str, str], Path]:
         ("owl:NamedIndividual, c:SituationType, c:Amount", "owl:NamedIndividual, c:SituationType", "isn't declared as an amount"),
     ],
 )  # fmt: skip
-def test_a_fault_in_amounts_is_found_with_its_node_and_its_mend(
+def test_a_fault_in_amounts_is_reported_with_its_node_and_a_remedy(
     canteen: Callable[[str, str], Path], old: str, new: str, said: str
 ) -> None:
     found = [finding for finding in validate([canteen(old, new)]) if said in finding.what]
@@ -69,7 +69,7 @@ def test_a_relation_gives_one_number_for_its_individuals(
         read(load(canteen(old, new)))
 
 
-def test_a_goal_that_compares_what_cant_be_is_refused(canteen: Callable[[str, str], Path]) -> None:
+def test_a_goal_with_a_comparison_of_an_undeclared_calculation_is_refused(canteen: Callable[[str, str], Path]) -> None:
     path = canteen('c:sign ">=" ; c:amount 0.5', 'c:sign ">=" ; c:right :round.half')
     with pytest.raises(KnowledgeError, match=r"used as a calculation"):
         read(load(path))

@@ -33,7 +33,7 @@ def changed(deleted: str, inserted: str = "") -> KnowledgeGraph:
 
 
 @pytest.mark.parametrize("name", ["beverage-serving", "cereal-serving", "kitchen-corner", "two-tables"])
-def test_no_behavior_of_a_shipped_scene_gives_an_exclusive_value_to_two(name: str) -> None:
+def test_no_behavior_of_a_shipped_scene_gives_an_exclusive_value_to_two_individuals(name: str) -> None:
     assert found(load(name)) == []
 
 
@@ -49,11 +49,13 @@ def test_no_behavior_of_a_shipped_scene_gives_an_exclusive_value_to_two(name: st
         ("k:B2_PLACE.free :ofClass k:Movable", "k:B2_PLACE.free :ofClass k:Cup", "B2_PLACE"),
     ],
 )
-def test_a_behavior_that_gives_an_exclusive_value_to_two_is_named(deleted: str, inserted: str, behavior: str) -> None:
+def test_a_behavior_that_gives_an_exclusive_value_to_two_individuals_is_named(
+    deleted: str, inserted: str, behavior: str
+) -> None:
     assert [name for name, _ in found(changed(deleted, inserted))] == [behavior]
 
 
-def test_what_a_behavior_takes_from_the_one_that_has_it_stays_exclusive() -> None:
+def test_a_behavior_that_moves_a_value_from_its_holder_keeps_the_value_exclusive() -> None:
     graph = changed("k:B3_GRASP.handEmpty :value k:nothing", "k:B3_GRASP.handEmpty :value k:nothing")
     over = """k:PASS a owl:NamedIndividual, :Behavior ; :level 3 ; :index 20 ; :parameter k:PASS.giver, k:PASS.taker ;
         :precondition k:PASS.gives, k:PASS.empty ; :postcondition k:PASS.has, k:PASS.lost .

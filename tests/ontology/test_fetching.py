@@ -69,7 +69,7 @@ def web() -> Iterator[str]:
     server.server_close()
 
 
-def test_an_import_by_url_is_told_of_then_fetched_then_found_offline(web: str, tmp_path: Path) -> None:
+def test_an_import_by_url_is_reported_then_fetched_then_found_offline(web: str, tmp_path: Path) -> None:
     scene = tmp_path / "mine.ttl"
     scene.write_text(TURTLE.format(iri="https://example.org/mine", more=IMPORTS.format(f"{web}/kitchen")))
     with pytest.raises(KnowledgeError, match=f"confab fetch {web}/kitchen --into"):
@@ -103,7 +103,7 @@ def test_the_kind_of_document_is_recognised(web: str, tmp_path: Path, name: str,
         ("gone", "404"),
     ],
 )
-def test_what_is_no_plain_ontology_is_refused_and_nothing_is_written(
+def test_a_download_that_is_no_plain_ontology_is_refused_and_not_stored(
     web: str, tmp_path: Path, name: str, said: str
 ) -> None:
     with pytest.raises(KnowledgeError, match=said) as error:
@@ -112,7 +112,9 @@ def test_what_is_no_plain_ontology_is_refused_and_nothing_is_written(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_is_too_large_or_too_slow_is_refused(web: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_download_that_is_too_large_or_too_slow_is_refused(
+    web: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(fetching, "MOST_BYTES", 2000)
     with pytest.raises(KnowledgeError, match="larger than"):
         fetch(f"{web}/large", tmp_path)

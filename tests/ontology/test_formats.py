@@ -58,7 +58,9 @@ def test_turtle_under_another_name_is_read(scene: Path) -> None:
         ("a.owl", '<?xml version="1.0"?>\n<Ontology xmlns="http://www.w3.org/2002/07/owl#"/>', "OWL/XML"),
     ],
 )
-def test_another_form_says_how_to_save_it(tmp_path: Path, name: str, text: str, form: str) -> None:
+def test_the_message_on_an_unsupported_format_says_how_to_save_the_file(
+    tmp_path: Path, name: str, text: str, form: str
+) -> None:
     (tmp_path / name).write_text(text)
     with pytest.raises(
         KnowledgeError, match=f"is in {form}, which isn't read here; open it in Protégé and save it as Turtle"
@@ -66,7 +68,7 @@ def test_another_form_says_how_to_save_it(tmp_path: Path, name: str, text: str, 
         load(tmp_path / name)
 
 
-def test_a_context_elsewhere_is_not_fetched(tmp_path: Path) -> None:
+def test_a_remote_json_ld_context_is_not_fetched(tmp_path: Path) -> None:
     (tmp_path / "a.jsonld").write_text('{"@context": "https://schema.org/", "@id": "https://e.org/a"}')
     with pytest.raises(KnowledgeError, match="nothing is fetched"):
         load(tmp_path / "a.jsonld")
@@ -86,22 +88,20 @@ NESTED = {
 
 
 @pytest.mark.parametrize("ending", NESTED)
-def test_what_is_nested_too_deeply_is_refused_in_every_form(tmp_path: Path, ending: str) -> None:
+def test_a_file_that_is_nested_too_deeply_is_refused_in_every_format(tmp_path: Path, ending: str) -> None:
     file = tmp_path / f"deep.{ending}"
     file.write_text(NESTED[ending])
     with pytest.raises(KnowledgeError, match="nested more than 1,000 deep"):
         load(file)
 
 
-def test_brackets_in_texts_and_many_that_are_closed_are_no_depth(tmp_path: Path) -> None:
+def test_brackets_in_literals_and_closed_brackets_do_not_count_as_nesting(tmp_path: Path) -> None:
     file = tmp_path / "flat.ttl"
     file.write_text("<urn:a> a <http://www.w3.org/2002/07/owl#Ontology> . " + '<urn:a> <urn:p> "((", [] , () . ' * 2000)
     assert load(file).scene == "urn:a"
 
 
-def test_json_ld_that_explodes_is_parsed_where_it_takes_nothing_along(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_json_ld_that_explodes_is_refused_at_a_memory_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("confab.reasoner.graph.documents.MEGABYTES", 300)
     terms = ",".join(f'"t{i}": "urn:t{i}"' for i in range(10_000))
     level = '{"@context": {"x": "urn:x"}, "@id": "urn:b", "t2":'
@@ -111,7 +111,7 @@ def test_json_ld_that_explodes_is_parsed_where_it_takes_nothing_along(
         load(file)
 
 
-def test_a_catalog_that_names_a_link_to_itself_is_one_line(scene: Path) -> None:
+def test_a_catalog_with_a_circular_link_gives_an_error_of_one_line(scene: Path) -> None:
     catalog, loop = scene.with_name("catalog-v001.xml"), scene.with_name("loop.ttl")
     loop.symlink_to("loop.ttl")
     catalog.write_text(catalog.read_text().replace('uri="tearoom.ttl"', 'uri="loop.ttl"'))

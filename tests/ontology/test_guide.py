@@ -24,7 +24,7 @@ BLOCK = re.compile(r'^```(turtle title=|console$)(?:"(add to )?([^"\n]+\.ttl)")?
 
 
 @pytest.mark.slow
-def test_the_authoring_guide_works_as_it_stands(
+def test_the_authoring_guide_works_if_it_is_followed_literally(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     said = []
@@ -95,7 +95,7 @@ def test_the_guide_s_renaming_leaves_a_domain_without_faults(tmp_path: Path) -> 
     assert [term for term in sorted(terms) if re.search(r"water|dry$|pot|^can(?!Reach)", term, re.IGNORECASE)] == []
 
 
-def test_the_guide_names_every_skill_and_perceiver_with_what_it_asks_for() -> None:
+def test_the_guide_names_every_skill_and_perceiver_with_its_requirements() -> None:
     graph = load(ontology.ROOT / "embodiment.ttl")
     prefix = "PREFIX e: <https://w3id.org/confab/embodiment#> "
     rows = graph.select(prefix + "SELECT ?who ?what WHERE { ?who e:asksFor ?what } ORDER BY ?who ?what")

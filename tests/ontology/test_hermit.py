@@ -49,7 +49,7 @@ def test_groups_of_different_individuals_may_share_members_in_any_order(logic: L
     assert not classify(logic(DIFFERENT + more + ":cup owl:sameAs :there .")).consistent
 
 
-def test_who_is_different_counts(logic: Logic) -> None:
+def test_hermit_takes_different_individuals_into_account(logic: Logic) -> None:
     busy = f":Busy rdfs:subClassOf [ a owl:Restriction ; owl:onProperty :holds ; owl:maxCardinality {ONE} ] ."
     holds = (
         ":holds a owl:ObjectProperty . :Busy a owl:Class . :robot a owl:NamedIndividual, :Busy ; :holds :here, :there ."
@@ -63,7 +63,7 @@ def test_a_class_that_can_have_no_individual_is_named_in_any_script(logic: Logic
     assert classify(logic(":Überall a owl:Class ; rdfs:subClassOf :Vessel, :Place .")).empty == (LOGIC + "Überall",)
 
 
-def test_types_of_individuals_are_concluded_if_somebody_asks(logic: Logic) -> None:
+def test_types_of_individuals_are_inferred_only_on_request(logic: Logic) -> None:
     graph = logic(":somewhere a owl:NamedIndividual . :cup :at :somewhere .")
     assert classify(graph).types == {}
     types = classify(graph, types=True).types
@@ -71,13 +71,13 @@ def test_types_of_individuals_are_concluded_if_somebody_asks(logic: Logic) -> No
     assert types[LOGIC + "cup"] == {LOGIC + "Cup"}
 
 
-def test_what_hermit_refuses_is_told_in_its_words(logic: Logic) -> None:
+def test_an_ontology_that_hermit_refuses_is_reported_in_the_words_of_hermit(logic: Logic) -> None:
     one = f"[ a owl:Restriction ; owl:onProperty :in ; owl:maxCardinality {ONE} ]"
     with pytest.raises(KnowledgeError, match=r"HermiT can't work on this ontology: .*logic#in"):
         classify(logic(f":in a owl:ObjectProperty, owl:TransitiveProperty . :Cup rdfs:subClassOf {one} ."))
 
 
-def test_a_thousand_different_individuals_are_told_apart_in_seconds(logic: Logic) -> None:
+def test_a_thousand_different_individuals_are_distinguished_in_seconds(logic: Logic) -> None:
     cups = [f":cup{number}" for number in range(1000)]
     many = " ".join(f"{cup} a owl:NamedIndividual, :Cup ; :at :here ." for cup in cups)
     many += f"[ a owl:AllDifferent ; owl:distinctMembers ( {' '.join(cups)} ) ] ."

@@ -22,7 +22,7 @@ def ontology_files() -> list[Path]:
     return sorted(path for path in files if path.suffixes[-2:-1] not in [[f".{kind}"] for kind in ontology.SATELLITES])
 
 
-def test_the_catalog_lists_exactly_the_files_there_are() -> None:
+def test_the_catalog_lists_exactly_the_existing_files() -> None:
     assert sorted(ontology.shipped().values()) == ontology_files()
 
 
@@ -33,7 +33,7 @@ def test_catalog_file_name_and_iri_agree(iri: str) -> None:
     assert file.stem == local_name(iri)
 
 
-def test_a_file_under_a_wrong_name_is_seen(tmp_path: Path) -> None:
+def test_a_file_with_a_wrong_name_is_detected(tmp_path: Path) -> None:
     scene = skeleton(tmp_path)
     renamed = scene.rename(tmp_path / "other.ttl")
     assert renamed.stem != local_name(ontology_iri(renamed))
@@ -75,7 +75,7 @@ def test_entity_tricks_in_rdf_xml_are_refused(tmp_path: Path, dtd: str) -> None:
         load(tmp_path / "mine.owl")
 
 
-def test_entities_that_abbreviate_a_namespace_are_let_through(tmp_path: Path) -> None:
+def test_entities_that_abbreviate_a_namespace_are_accepted(tmp_path: Path) -> None:
     dtd = '<!DOCTYPE rdf:RDF [ <!ENTITY mine "https://example.org/"> ]>\n'
     (tmp_path / "mine.owl").write_text(HEAD.format(dtd) + BODY.replace("https://example.org/mine", "&mine;mine"))
     assert load(tmp_path / "mine.owl").scene == "https://example.org/mine"

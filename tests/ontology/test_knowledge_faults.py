@@ -46,7 +46,7 @@ FEE = """
          "state such an amount"),
     ],
 )  # fmt: skip
-def test_a_fault_is_told_once_with_line_and_mend(
+def test_a_fault_is_reported_once_with_line_and_remedy(
     tmp_path: Path, old: str, new: str, file: str, node: str, what: str, remedy: str
 ) -> None:
     for one in THEATRE.glob("*.ttl"):
@@ -82,7 +82,7 @@ CARRYING = "[ a owl:Restriction ; owl:onProperty :carries ; owl:someValuesFrom :
         (":FullCart rdfs:subClassOf :Where .", ""),
     ],
 )
-def test_what_owl_demands_of_every_state_is_not_ignored_silently(tmp_path: Path, more: str, said: str) -> None:
+def test_an_axiom_that_planning_does_not_enforce_is_reported(tmp_path: Path, more: str, said: str) -> None:
     for one in THEATRE.glob("*.ttl"):
         text = one.read_text(encoding="utf-8") + (more if one.stem == "theatre" else "")
         (tmp_path / one.name).write_text(text, encoding="utf-8")
@@ -108,7 +108,9 @@ def theatre_with(folder: Path, old: str, new: str, more: str) -> list[Finding]:
 
 
 @pytest.mark.parametrize("subject", ["?cart", "?room"])
-def test_an_effect_on_what_axioms_define_is_at_fault_and_not_the_definition(tmp_path: Path, subject: str) -> None:
+def test_an_effect_on_a_situation_type_that_axioms_define_is_the_fault_and_not_the_definition(
+    tmp_path: Path, subject: str
+) -> None:
     """The object isn't at fault either, although it may lack the situation type.
 
     Declaring the type for its class would disable the definition.
@@ -130,7 +132,7 @@ def test_an_effect_on_what_axioms_define_is_at_fault_and_not_the_definition(tmp_
         (FUNCTIONAL, "", "since near is functional", "drop owl:FunctionalProperty of near"),
     ],
 )  # fmt: skip
-def test_an_axiom_that_is_not_evaluated_is_told_why(
+def test_an_axiom_that_is_not_evaluated_is_reported_with_the_reason(
     tmp_path: Path, kind: str, effect: str, what: str, remedy: str
 ) -> None:
     insert = "INSERT { ?cart :carries ?prop"
@@ -140,7 +142,7 @@ def test_an_axiom_that_is_not_evaluated_is_told_why(
     assert remedy in said.remedy
 
 
-def test_each_defined_situation_type_is_told_to_be_derived_or_static(tmp_path: Path) -> None:
+def test_each_defined_situation_type_is_listed_as_derived_or_static(tmp_path: Path) -> None:
     more = """:HUNG a owl:NamedIndividual, c:SituationType ; c:holdsOf :Hung . :Lamp c:hasSituationType :HUNG .
     :Hung a owl:Class, owl:NamedIndividual ; owl:equivalentClass [ a owl:Class ; owl:intersectionOf
       ( :Lamp [ a owl:Restriction ; owl:onProperty :hangsOn ; owl:someValuesFrom :Circuit ] ) ] ."""
@@ -152,7 +154,7 @@ def test_each_defined_situation_type_is_told_to_be_derived_or_static(tmp_path: P
     }
 
 
-def test_what_a_swrl_rule_names_is_a_declared_variable_or_an_individual(tmp_path: Path) -> None:
+def test_an_undeclared_variable_of_a_swrl_rule_is_reported_with_the_declaration(tmp_path: Path) -> None:
     rule = SWRL + implies(":Stowed ?prop", ":Prop ?prop", "different ?prop ?porp")
     (said,) = theatre_with(tmp_path, "", "", rule.replace("<urn:swrl:var#porp> a swrl:Variable .", ""))
     assert (said.rule, Path(said.file).stem) == ("undeclared-term", "theatre")
@@ -171,12 +173,12 @@ def test_a_class_that_a_swrl_rule_or_a_definition_names_is_declared(tmp_path: Pa
         assert ":Prob" in Path(said.file).read_text(encoding="utf-8").splitlines()[said.line - 1]
 
 
-def test_a_cost_in_quotes_is_no_negative_one(tmp_path: Path) -> None:
+def test_a_cost_in_quotes_is_not_reported_as_negative(tmp_path: Path) -> None:
     (said,) = theatre_with(tmp_path, ":PUSH a owl:NamedIndividual,", ':PUSH c:cost "2" ; a owl:NamedIndividual,', "")
     assert (said.rule, local_name(said.node)) == ("not-a-number", "PUSH")
 
 
-def test_a_number_of_another_type_is_shown_as_it_is_written(tmp_path: Path) -> None:
+def test_a_number_of_a_wrong_type_is_shown_as_written(tmp_path: Path) -> None:
     found = theatre_with(tmp_path, ":PUSH a owl:NamedIndividual,", ":PUSH c:index 2.5 ; a owl:NamedIndividual,", "")
     (said,) = (one for one in found if one.rule == "not-a-number")
     assert said.remedy == "write a whole number like 3"
@@ -222,7 +224,7 @@ MINI = """
     ],
     ids=["a text for a value", "no update", "units", "a misspelt name", "conditions that contradict each other"],
 )  # fmt: skip
-def test_a_cause_in_updates_is_told_once_whatever_inherits_it(
+def test_a_fault_in_an_update_is_reported_once_even_if_other_behaviours_inherit_it(
     tmp_path: Path, said: dict[str, str], node: str, what: str
 ) -> None:
     text = (
@@ -235,7 +237,7 @@ def test_a_cause_in_updates_is_told_once_whatever_inherits_it(
     assert (local_name(finding.node), finding.line > 0, bool(finding.remedy)) == (node, True, True)
 
 
-def test_a_value_property_of_what_is_no_situation_type_is_told_in_an_update(tmp_path: Path) -> None:
+def test_a_value_property_without_a_situation_type_is_reported_in_an_update(tmp_path: Path) -> None:
     text = MINI.format(shut="false", unit="kg").replace("c:SituationType ;", "c:Level ;")
     text = text.replace(
         ":SHUT a owl:Class, owl:NamedIndividual, c:Level ;", ":SHUT a owl:Class ; c:valueProperty :shuts ;"

@@ -56,7 +56,7 @@ def test_a_question_has_its_known_answer(question: Question) -> None:
 
 
 @pytest.mark.parametrize("question", QUESTIONS, ids=lambda question: question.name)
-def test_without_what_it_asks_for_the_answer_is_another_one(question: Question) -> None:
+def test_a_question_has_another_answer_without_the_triples_that_it_needs(question: Question) -> None:
     graph = scene(question.scene)
     prefix, name = question.needs.split(":")
     needed = ox.NamedNode(graph.prefixes[prefix] + name)
@@ -74,7 +74,7 @@ def test_without_what_it_asks_for_the_answer_is_another_one(question: Question) 
     ],
     ids=["amounts and defaults", "pairs", "defined"],
 )
-def test_each_goal_is_listed_whatever_its_situation_is_at_first(name: str, rows: list[str]) -> None:
+def test_each_goal_is_listed_whatever_its_initial_value(name: str, rows: list[str]) -> None:
     wanted = next(question for question in QUESTIONS if question.name == "what-is-wanted")
     assert answer(scene(name), wanted) == rows
 

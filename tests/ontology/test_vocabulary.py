@@ -29,12 +29,12 @@ def has_java() -> bool:
         return False
 
 
-def test_the_page_is_what_the_files_say() -> None:
+def test_the_vocabulary_page_agrees_with_the_files() -> None:
     assert vocabulary.PAGE.read_text(encoding="utf-8") == vocabulary.page(), "run make vocabulary"
 
 
 @pytest.mark.parametrize("name", vocabulary.FILES)
-def test_every_term_says_who_defines_it_and_what_it_means(name: str) -> None:
+def test_every_term_names_its_ontology_and_has_a_definition(name: str) -> None:
     graph = rdflib.Graph().parse(ontology.ROOT / name)
     (about,) = graph.subjects(RDF.type, OWL.Ontology)
     space = str(graph.value(about, vocabulary.VANN.preferredNamespaceUri))

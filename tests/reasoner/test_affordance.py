@@ -32,7 +32,7 @@ def afforded(name: str | Path, **changes: str) -> set[tuple[str, ...]]:
     return {(found.object, found.behavior, *found.arguments) for found in affordances(graph, reading, state)}
 
 
-def test_a_cup_affords_pouring_when_a_drink_is_asked_for() -> None:
+def test_a_cup_affords_pouring_if_a_drink_is_wanted() -> None:
     assert ("cup1", "POUR", "bottle1", "cup1") not in afforded("living-room")
     assert ("cup1", "POUR", "bottle1", "cup1") in afforded("living-room", anna__WISH="juice")
     assert ("cup1", "POUR", "bottle1", "cup1") not in afforded("living-room", anna__WISH="tea")
@@ -81,7 +81,7 @@ def states(reading: Reading, level: int) -> list[State]:
 @pytest.mark.parametrize(
     ("name", "level"), [("beverage-serving", 1), ("beverage-serving", 2), ("beverage-serving", 3), ("living-room", 1)]
 )
-def test_sparql_and_the_planner_agree_on_what_can_be_done(name: str, level: int) -> None:
+def test_sparql_and_the_planner_agree_on_the_applicable_behaviours(name: str, level: int) -> None:
     graph, reading = scene(name)
     model, grounds = Model(reading.problem), ground(reading.problem, level)
     for state in states(reading, level):
@@ -95,14 +95,14 @@ def test_sparql_and_the_planner_agree_on_what_can_be_done(name: str, level: int)
         assert found == wanted
 
 
-def test_the_query_can_be_read_and_names_the_graph_it_asks() -> None:
+def test_the_query_of_applicable_behaviours_names_the_graph_of_the_situation() -> None:
     graph, reading = scene("beverage-serving")
     query = applicable_query(graph, reading, reading.problem.domain.behaviors["B2_PICK"])
     assert f"GRAPH <{SITUATION}>" in query
     assert "canReach" in query
 
 
-def test_a_class_that_was_added_yesterday_is_quantified_over(tmp_path: Path) -> None:
+def test_an_added_subclass_and_its_individual_are_quantified_over(tmp_path: Path) -> None:
     path = skeleton(tmp_path)
     text = path.read_text()
     added = (
@@ -114,7 +114,7 @@ def test_a_class_that_was_added_yesterday_is_quantified_over(tmp_path: Path) -> 
     assert read(load(path)).problem.id_of("B1_WASH", ("bowl1",)) == 11
 
 
-def test_what_is_defined_counts_for_what_something_affords() -> None:
+def test_affordances_take_defined_situation_types_into_account() -> None:
     graph = load("packing-small")
     reading = read(graph)
     found = {(one.object, one.behavior) for one in affordances(graph, reading)}

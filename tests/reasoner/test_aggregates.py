@@ -107,7 +107,7 @@ def test_a_rule_without_an_aggregate_is_a_query_too(tmp_path: Path) -> None:
     assert [condition.kind for condition in rule.conditions] == ["Crate"]  # type: ignore[union-attr]
 
 
-def test_the_checker_works_a_total_out_from_its_rule() -> None:
+def test_the_checker_calculates_a_total_from_its_rule() -> None:
     scene = confab.load("carts-small")
     result = scene.plan()
     assert result.outcome.status is Status.SOLVED
@@ -124,7 +124,7 @@ def test_the_checker_works_a_total_out_from_its_rule() -> None:
     ]
 
 
-def test_a_fact_that_is_changed_changes_what_is_derived_from_it() -> None:
+def test_a_changed_fact_changes_the_amounts_that_are_derived_from_it() -> None:
     moved = confab.load("carts-small").with_fact("books IN cart").problem
     assert moved.initial[Symbol("LOAD", ("cart",))] == "7"
     assert moved.initial[Symbol("STOCK", ("store",))] == "2"
@@ -160,7 +160,7 @@ LAMPS = """
 """The goal requires that two lamps are on, but at most one lamp of a house may be on; only the count mentions the house."""
 
 
-def test_the_bound_of_a_count_holds_though_no_goal_and_no_behaviour_names_its_individual(tmp_path: Path) -> None:
+def test_the_bound_of_a_count_holds_even_if_no_goal_and_no_behaviour_names_its_individual(tmp_path: Path) -> None:
     (tmp_path / "lamps.ttl").write_text(LAMPS)
     outcome = confab.load(tmp_path / "lamps.ttl").plan().outcome
     assert outcome.status is Status.UNSOLVABLE

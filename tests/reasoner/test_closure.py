@@ -105,20 +105,20 @@ WORLDS = {
 
 
 @pytest.mark.parametrize("what", WORLDS)
-def test_a_slice_has(tmp_path: Path, what: str) -> None:
+def test_the_slice_is_solvable_exactly_if_the_world_is(tmp_path: Path, what: str) -> None:
     text, expected = WORLDS[what]
     graph = graph_of(HEAD + THINGS + text, tmp_path)
     assert solvable(read(graph).problem, 100) is expected
     assert solvable(recognise(graph).problem, 100) is expected
 
 
-def test_what_nothing_asks_or_changes_is_left_out(tmp_path: Path) -> None:
+def test_individuals_that_no_step_requires_or_changes_are_left_out_of_the_slice(tmp_path: Path) -> None:
     sliced = recognise(graph_of(HEAD + THINGS, tmp_path)).problem
     assert sliced.classes["Thing"] == ("x",)
     assert sliced.classes["Spot"] == ()
 
 
-def test_a_situation_type_none_of_whose_values_is_in_the_slice_has_values_all_the_same() -> None:
+def test_a_situation_type_without_values_in_the_slice_does_not_become_boolean() -> None:
     path = Path(__file__).parents[1] / "planner/cases/values-outside-of-the-slice.ttl"
     slice_, whole = recognise(load(path)).problem, read(load(path)).problem
     assert "F0v0" not in slice_.classes.get("F0", ())

@@ -112,7 +112,7 @@ def test_a_definition_may_name_another_one(tmp_path: Path) -> None:
     assert asked_of_item(path) == AnyOf(((ClassCondition("?item", "Item"), DIRTY_VALUE),))
 
 
-def test_an_inverse_property_turns_the_condition_round(tmp_path: Path) -> None:
+def test_an_inverse_property_swaps_the_individuals_of_the_condition(tmp_path: Path) -> None:
     occupied = restriction("[ owl:inverseOf :isAt ]", "owl:someValuesFrom :Plate")
     path = scene(tmp_path, defined(both(":Place", occupied)))
     text = (
@@ -154,7 +154,7 @@ def test_a_parameter_of_a_defined_class_ranges_over_its_base_and_is_tested_in_th
     assert not applicable(reading, "plate1", PLACE="sink", CLEANLINESS="clean")
 
 
-def test_nobody_is_stated_to_be_in_a_class_that_changes(tmp_path: Path) -> None:
+def test_inference_adds_no_members_to_a_class_that_changes(tmp_path: Path) -> None:
     graph = load(scene(tmp_path, defined(both(":Item", IS_DIRTY))))
     infer(graph, always=True)
     assert graph.select("SELECT ?x WHERE { ?x a <https://example.org/washing#Special> }") == []
@@ -231,7 +231,7 @@ def test_a_class_that_a_rule_concludes_may_be_named_in_another_definition(tmp_pa
         (both(":Place", ":Sink"), {"sink"}),
     ],
 )  # fmt: skip
-def test_a_class_that_never_changes_is_closed_where_owl_rl_finds_nobody(
+def test_a_static_class_has_the_right_members_even_if_owl_rl_infers_none(
     tmp_path: Path, expression: str, members: set[str]
 ) -> None:
     """A class that names a static class is closed, too, and contains the individuals that are stated to be its members."""

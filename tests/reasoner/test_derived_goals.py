@@ -44,7 +44,7 @@ GOALS = {
 
 
 @pytest.mark.parametrize("name", GOALS)
-def test_a_goal_that_is_no_fact_is_achieved_and_checked(name: str, tmp_path: Path) -> None:
+def test_a_goal_with_a_compound_condition_is_achieved_and_checked(name: str, tmp_path: Path) -> None:
     said, least = GOALS[name]
     begin = SCENE.index("  c:goal ")
     head, rest = SCENE[:begin], SCENE[SCENE.index(" .\n", begin) :]

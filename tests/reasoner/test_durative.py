@@ -72,7 +72,7 @@ def accepted(domain: str, problem: str, found: Imported, timed: TimedPlan) -> bo
     return bool(TimeTriggeredPlanValidator().validate(read, plan))
 
 
-def test_fuses_are_mended_while_a_match_burns() -> None:
+def test_fuses_are_repaired_while_a_match_burns() -> None:
     found = imported(parse(CELLAR, FUSES))
     timed = planned(found)
     assert only_during(found.problem) == {"STRIKE"}
@@ -80,7 +80,7 @@ def test_fuses_are_mended_while_a_match_burns() -> None:
     assert accepted(CELLAR, FUSES, found, timed)
 
 
-def test_a_duration_is_worked_out_and_a_fact_begins_to_hold_in_time() -> None:
+def test_a_duration_is_calculated_and_a_timed_initial_fact_is_awaited() -> None:
     found = imported(parse(TRUCK, WAY))
     timed = planned(found)
     seconds = {slot.step.arguments[0]: slot.end - slot.begin for slot in timed.slots if slot.step.behavior == "DRIVE"}
@@ -89,7 +89,9 @@ def test_a_duration_is_worked_out_and_a_fact_begins_to_hold_in_time() -> None:
 
 
 @pytest.mark.parametrize(("domain", "problem"), [(CELLAR, FUSES), (TRUCK, WAY)])
-def test_a_scene_file_says_everything_of_time_that_the_domain_says(domain: str, problem: str, tmp_path: Path) -> None:
+def test_a_scene_file_keeps_all_durations_and_timed_conditions_of_a_pddl_domain(
+    domain: str, problem: str, tmp_path: Path
+) -> None:
     found = imported(parse(domain, problem)).problem
     path = tmp_path / "scene.ttl"
     path.write_text(turtle(found, "title", "description"), encoding="utf-8")
@@ -130,7 +132,7 @@ def test_a_scene_with_time_is_planned_with_its_schedule(tmp_path: Path) -> None:
         (":effect (when (at start (unused ?m)) (at end (light ?m)))", "at another time than the effect"),
     ],
 )
-def test_what_has_no_time_or_another_one_is_refused_with_its_place(text: str, said: str) -> None:
+def test_a_condition_or_effect_with_a_missing_or_wrong_time_is_refused_with_its_place(text: str, said: str) -> None:
     head = CELLAR[: CELLAR.index("(:durative-action strike")]
     domain = f"{head}\n(:durative-action strike :parameters (?m - match) :duration (= ?duration 5) {text}))"
     with pytest.raises(PddlError, match=rf"domain:4:\d+: .*({said})"):

@@ -37,7 +37,7 @@ def test_merging_is_commutative_associative_and_idempotent(a: object, b: object,
 
 
 @given(histories, histories)
-def test_the_raw_counts_equal_those_of_one_robot_that_lived_both_histories(a: object, b: object) -> None:
+def test_merged_counts_equal_those_of_one_robot_with_both_histories(a: object, b: object) -> None:
     both = lived("both", [*a, *b])  # type: ignore[misc]
     assert merged(lived("one", a), lived("two", b)).totals() == both.totals()  # type: ignore[arg-type]
 

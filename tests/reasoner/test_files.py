@@ -34,7 +34,7 @@ def test_texts_bytes_and_pieces_are_written_as_they_are(tmp_path: Path) -> None:
     assert left(folder) == ["0", "1", "2", "3"]
 
 
-def test_what_fails_while_it_is_made_or_read_back_replaces_nothing(tmp_path: Path) -> None:
+def test_a_content_that_fails_while_it_is_made_or_read_back_replaces_no_file(tmp_path: Path) -> None:
     file = tmp_path / "a.txt"
     file.write_text(ROWS + "old")
 
@@ -73,7 +73,7 @@ def test_permissions_stay_and_new_files_have_those_of_the_umask(tmp_path: Path, 
 
 
 @pytest.mark.skipif(os.getuid() != 0, reason="only root can give a file away")
-def test_a_file_of_somebody_else_stays_theirs(tmp_path: Path) -> None:
+def test_a_rewritten_file_keeps_its_owner(tmp_path: Path) -> None:
     file = tmp_path / "a.txt"
     file.write_text(ROWS + "old")
     os.chown(file, 1234, 2345)
@@ -81,7 +81,7 @@ def test_a_file_of_somebody_else_stays_theirs(tmp_path: Path) -> None:
     assert (file.stat().st_uid, file.stat().st_gid) == (1234, 2345)
 
 
-def test_links_are_followed_also_in_circles_and_to_what_isnt_there_yet(tmp_path: Path) -> None:
+def test_links_to_missing_files_are_followed_and_circular_links_are_refused(tmp_path: Path) -> None:
     (tmp_path / "one").symlink_to("two")
     (tmp_path / "two").symlink_to("three")
     write_whole(tmp_path / "one", "x")
@@ -93,7 +93,7 @@ def test_links_are_followed_also_in_circles_and_to_what_isnt_there_yet(tmp_path:
         write_whole(tmp_path / "a", "x")
 
 
-def test_what_is_no_ordinary_file_or_read_only_is_left_and_named(tmp_path: Path) -> None:
+def test_a_path_to_a_folder_a_pipe_or_a_read_only_file_is_named_and_not_replaced(tmp_path: Path) -> None:
     folder, pipe, locked = tmp_path / "folder", tmp_path / "pipe", tmp_path / "locked"
     folder.mkdir()
     os.mkfifo(pipe)
@@ -110,9 +110,7 @@ def test_what_is_no_ordinary_file_or_read_only_is_left_and_named(tmp_path: Path)
     assert error.value.filename == str(locked / "inside")
 
 
-def test_one_writes_after_the_other_and_who_waits_says_so_once(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_second_writer_waits_for_the_first_and_says_so_once(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     (tmp_path / "link").symlink_to("a.txt")
     order: list[str] = []
 
@@ -132,7 +130,7 @@ def test_one_writes_after_the_other_and_who_waits_says_so_once(
         assert (tmp_path / "b").is_dir()
 
 
-def test_nobody_waits_for_ever(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_writer_gives_up_waiting_after_a_time_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(files, "PATIENCE", 0.05)
     with alone(tmp_path / "a.txt"), pytest.raises(LimitError, match="has been writing in"), alone(tmp_path / "b.txt"):
         pass

@@ -72,7 +72,7 @@ CONDITIONS = st.recursive(
 
 @settings(max_examples=200, deadline=None)
 @given(st.lists(CONDITIONS, max_size=4), st.lists(SIMPLE, max_size=1))
-def test_folded_conditions_hold_in_the_same_states_among_those_where_the_known_ones_hold(
+def test_folded_conditions_hold_in_the_same_states_in_which_the_known_ones_hold(
     conditions: list[Condition], known: list[Condition]
 ) -> None:
     folded = Folding(CLASSES, {"?x": "Cup"}, frozenset(known)).conjunction(conditions)
@@ -85,7 +85,7 @@ def test_folded_conditions_hold_in_the_same_states_among_those_where_the_known_o
         assert before == after
 
 
-def test_a_part_that_contradicts_another_condition_is_left_out() -> None:
+def test_an_alternative_that_contradicts_another_condition_is_left_out() -> None:
     on = ValueCondition("ON", ("?x",), "a")
     either = AnyOf(((on, EqualityCondition("?x", "b")), (ValueCondition("ON", ("?x",), "b"),)))
     assert Folding(CLASSES, {"?x": "Cup"}).conjunction([on, either]) == (on, EqualityCondition("?x", "b"))

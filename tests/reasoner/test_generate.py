@@ -45,7 +45,7 @@ def test_a_template_with_the_prefixes_of_its_table_is_turtle(path: Path) -> None
     assert list(ox.parse(text.encode(), format=ox.RdfFormat.TURTLE))
 
 
-def test_four_objects_served_are_the_papers_table(tmp_path: Path) -> None:
+def test_a_generated_scene_with_four_objects_is_the_table_of_the_paper(tmp_path: Path) -> None:
     generated, paper = reading_of(tmp_path, "served").problem, read(load("beverage-serving")).problem
     assert where(generated) == where(paper)
     assert {name: len(members) for name, members in generated.classes.items()} == {
@@ -71,7 +71,7 @@ def test_a_generated_scene_is_valid(tmp_path: Path, family: str) -> None:
     assert validate([path]) == []
 
 
-def test_no_hand_reaches_a_goal_of_the_unsolvable(tmp_path: Path) -> None:
+def test_an_unsolvable_scene_has_one_goal_place_that_no_hand_reaches(tmp_path: Path) -> None:
     problem = reading_of(tmp_path, "unsolvable", objects=6).problem
     reached = {place for _, place in problem.relations["canReach"]}
     assert len([place for place in where(problem, "goal").values() if place not in reached]) == 1
@@ -93,13 +93,13 @@ def test_the_same_seed_gives_the_same_text(family: str, objects: int, hands: int
 
 
 @given(columns=st.integers(2, 60), hands=st.integers(1, 6))
-def test_strips_leave_no_column_out_and_neighbours_share_one(columns: int, hands: int) -> None:
+def test_the_strips_of_hands_cover_all_places_and_neighbours_overlap(columns: int, hands: int) -> None:
     reach = [set(places) for places in strips(columns, hands, range(1, 2 * columns + 1))]
     assert set().union(*reach) == set(range(1, 2 * columns + 1))
     assert all(one & other for one, other in pairwise(reach))
 
 
-def test_a_scene_says_that_it_has_no_geometry() -> None:
+def test_a_generated_scene_states_that_it_has_no_geometry() -> None:
     assert "c:symbolicOnly true" in generate("swap")
 
 
@@ -117,6 +117,8 @@ def test_every_placement_is_used_by_a_family() -> None:
         (("handover", 4, 1), "take 2 hands or more"),
     ],
 )
-def test_impossible_wishes_are_refused_by_name(arguments: tuple[str, int, int], message: str) -> None:
+def test_impossible_parameters_of_a_generated_scene_are_refused_by_name(
+    arguments: tuple[str, int, int], message: str
+) -> None:
     with pytest.raises(KnowledgeError, match=message):
         generate(*arguments)

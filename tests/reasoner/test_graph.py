@@ -40,7 +40,7 @@ def test_a_file_that_cannot_be_used_is_named_with_its_fault(tmp_path: Path, cont
         load(path)
 
 
-def test_an_unknown_scene_is_answered_with_the_known_ones() -> None:
+def test_the_message_on_an_unknown_scene_lists_the_known_ones() -> None:
     with pytest.raises(KnowledgeError, match="beverage-serving"):
         load("beverage-srving")
 
@@ -54,7 +54,7 @@ def test_a_catalog_with_entities_is_refused(tmp_path: Path) -> None:
         load(tmp_path / "mine.ttl")
 
 
-def test_a_catalog_that_leads_to_a_circle_of_links_is_a_clear_error(tmp_path: Path) -> None:
+def test_a_catalog_entry_with_a_circular_link_is_a_clear_error(tmp_path: Path) -> None:
     (tmp_path / "catalog-v001.xml").write_text(
         '<catalog xmlns="urn:oasis:names:tc:entity:xmlns:xml:catalog"><uri name="urn:l" uri="loop.ttl"/></catalog>'
     )
@@ -72,7 +72,7 @@ def test_a_query_that_is_no_sparql_is_a_clear_error() -> None:
         graph.select("ASK { ?a ?b ?c }")
 
 
-def test_a_file_is_read_no_further_when_the_deadline_has_come(tmp_path: Path) -> None:
+def test_reading_of_a_file_stops_at_the_deadline(tmp_path: Path) -> None:
     file = tmp_path / "large.ttl"
     file.write_text("<urn:s> a <http://www.w3.org/2002/07/owl#Ontology> .\n" + "<urn:a> <urn:b> <urn:c> .\n" * 100_000)
     checked: list[str] = []

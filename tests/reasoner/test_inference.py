@@ -24,7 +24,7 @@ def inferred(graph: KnowledgeGraph, prop: str) -> set[tuple[str, str]]:
     return {(s.value.split("#")[1], o.value.split("#")[1]) for s, o in rows if s and o}
 
 
-def test_the_reasoner_stays_out_of_an_ontology_that_needs_none() -> None:
+def test_the_reasoner_does_not_run_on_an_ontology_without_axioms_for_it() -> None:
     graph = load("beverage-serving")
     assert not needed(graph)
     assert infer(graph) == 0
@@ -56,7 +56,7 @@ def test_a_transitive_relation_is_closed_and_the_planner_sees_it(tmp_path: Path)
         ),
     ],
 )
-def test_static_relations_are_completed(
+def test_inference_completes_static_relations(
     tmp_path: Path, axiom: str, stated: str, concluded: tuple[str, tuple[str, str]]
 ) -> None:
     graph = graph_of(tmp_path, axiom, stated)
@@ -74,7 +74,7 @@ def test_a_class_defined_by_a_static_relation_gets_its_individuals(tmp_path: Pat
     assert read(graph).problem.classes["Handy"] == ("table",)
 
 
-def test_facts_that_may_change_prove_nothing_about_others(tmp_path: Path) -> None:
+def test_changeable_facts_lead_to_no_static_inference(tmp_path: Path) -> None:
     domain = (
         ":AtSink a owl:Class ; rdfs:label 'x' ; rdfs:subClassOf :Item . "
         "[ a owl:Restriction ; owl:onProperty :isAt ; owl:hasValue :dirty ] rdfs:subClassOf :AtSink ."
@@ -85,7 +85,7 @@ def test_facts_that_may_change_prove_nothing_about_others(tmp_path: Path) -> Non
     assert inferred(graph, "d:isAt") == set()
 
 
-def test_individuals_that_would_become_one_are_refused_by_name(tmp_path: Path) -> None:
+def test_individuals_that_inference_would_identify_are_refused_by_name(tmp_path: Path) -> None:
     graph = graph_of(
         tmp_path,
         NEAR + ", owl:FunctionalProperty, owl:SymmetricProperty .",

@@ -46,7 +46,7 @@ EITHER = AnyOf(((has("AT", "?c", "?p"), NEAR), (KIND, SAME)))
         (AnyOf(((LOOKED_FOR,), (NEAR,))), (), {"?p", "?room", "?q"}, {"?p", "?q"}),
     ],
 )
-def test_what_a_condition_names_mentions_and_needs(
+def test_each_kind_of_condition_has_the_right_terms_mentions_and_needs(
     condition: Condition, named: tuple[str, ...], mentioned: set[str], needed: set[str]
 ) -> None:
     assert terms(condition) == named
@@ -58,7 +58,7 @@ def test_variables_begin_with_a_question_mark() -> None:
     assert [is_variable(term) for term in ("?c", "cup1", "c?", "")] == [True, False, False, False]
 
 
-def test_what_is_inside_comes_group_by_group_and_after_what_holds_it() -> None:
+def test_nested_conditions_are_walked_group_by_group_after_their_parent() -> None:
     assert [groups(c) for c in (AT, NEAR, KIND, SAME, FULL)] == [()] * 5
     assert groups(LOOKED_FOR) == (LOOKED_FOR.conditions,)
     assert groups(EITHER) == EITHER.alternatives
@@ -66,7 +66,7 @@ def test_what_is_inside_comes_group_by_group_and_after_what_holds_it() -> None:
     assert list(walk(nested)) == [nested, LOOKED_FOR, *LOOKED_FOR.conditions, KIND, SAME]
 
 
-def test_relations_that_give_numbers_are_found_wherever_they_are_asked_for() -> None:
+def test_numeric_relations_are_found_in_all_parts_of_behaviours() -> None:
     size, way, load = (Measure(name, ("?c",)) for name in ("size", "way", "load"))
     one = Behavior("A", 1, (), preconditions=(Witness("?o", "Cup", (Comparison(size, "<", Fraction(1)),)), NEAR))
     two = Behavior("B", 1, (), amounts=(AmountEffect("FILL", ("?c",), "increase", Calculation("*", way, Fraction(2))),))
@@ -76,6 +76,6 @@ def test_relations_that_give_numbers_are_found_wherever_they_are_asked_for() -> 
     assert measures([]) == frozenset()
 
 
-def test_what_nothing_determines_is_said() -> None:
+def test_variables_that_no_condition_determines_are_named() -> None:
     error = nothing_determines("B1_MOVE", [NOT_AT, SAME, AT], {"?c", "?room"})
     assert str(error) == "B1_MOVE: nothing determines ?d, ?p; add a value condition that does"

@@ -40,7 +40,7 @@ def test_links_to_truth_values_survive_the_file(tmp_path: Path, serving: Reading
 
 
 @pytest.mark.parametrize("share", ["-0.75", "1.5", "NaN"])
-def test_a_share_that_is_none_is_refused(tmp_path: Path, serving: Reading, share: str) -> None:
+def test_an_invalid_probability_of_a_link_is_refused(tmp_path: Path, serving: Reading, share: str) -> None:
     file, move = tmp_path / "m.ttl", ("B1_MOVE", ("cup1", "location7"))
     links = Links({move: {Symbol("LOCATION", ("cup1",)): {"location2": 0.75, "location3": 0.25}}})
     save_links(file, links, serving.names, serving.problem.scene)
@@ -50,7 +50,7 @@ def test_a_share_that_is_none_is_refused(tmp_path: Path, serving: Reading, share
         load_links(file, serving.names)
 
 
-def test_links_survive_a_program_that_writes_the_file_anew(tmp_path: Path, serving: Reading, links: Links) -> None:
+def test_links_survive_a_rewrite_of_the_file_by_another_program(tmp_path: Path, serving: Reading, links: Links) -> None:
     save_links(tmp_path / "ours.ttl", links, serving.names, serving.problem.scene)
     rdflib.Graph().parse(tmp_path / "ours.ttl").serialize(tmp_path / "theirs.ttl")
     assert load_links(tmp_path / "theirs.ttl", serving.names) == links
@@ -94,7 +94,9 @@ def test_terms_that_the_scene_does_not_have_are_kept_under_their_names(tmp_path:
     assert load_links(tmp_path / "m.ttl", serving.names) == links
 
 
-def test_the_text_of_links_is_that_of_the_file_without_its_head(tmp_path: Path, serving: Reading, links: Links) -> None:
+def test_the_text_of_links_is_the_content_of_the_file_without_its_head(
+    tmp_path: Path, serving: Reading, links: Links
+) -> None:
     text = links_text(links, serving.names, serving.problem.scene)
     assert "imports" not in text
     assert "Ontology" not in text
@@ -108,7 +110,7 @@ def test_the_text_of_links_is_that_of_the_file_without_its_head(tmp_path: Path, 
         memory_names(tmp_path / "n.ttl")
 
 
-def test_what_a_memory_imports_has_a_name(tmp_path: Path, serving: Reading, links: Links) -> None:
+def test_a_blank_node_is_no_import_of_a_memory(tmp_path: Path, serving: Reading, links: Links) -> None:
     file = tmp_path / "m.ttl"
     save_links(file, links, serving.names, serving.problem.scene)
     file.write_text(f"{file.read_text()}\n_:some <http://www.w3.org/2002/07/owl#imports> _:other .\n")

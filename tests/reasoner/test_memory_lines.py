@@ -42,7 +42,7 @@ def the_rule(text: str) -> Rule:
     return found
 
 
-def test_what_was_learned_is_called_by_what_it_says() -> None:
+def test_the_label_of_a_learned_part_describes_its_content() -> None:
     assert label(rule()) == "for cup AT day place: MOVE cup place"
     assert label(Order("AT", "FULL", ())) == "AT before FULL"
     assert label(Order("AT", "FULL", ((0, 0),))) == "AT before FULL of the same"
@@ -70,7 +70,7 @@ def deep(most: int, wrap: Callable[[Condition], Condition]) -> Condition:
 
 
 @pytest.mark.parametrize("wrap", [lambda c: AnyOf(((c,),)), lambda c: Witness("?x", "Cup", (c,))])
-def test_conditions_may_lie_inside_one_another_but_not_for_ever(wrap: Callable[[Condition], Condition]) -> None:
+def test_conditions_of_a_rule_may_be_nested_to_a_maximum_depth(wrap: Callable[[Condition], Condition]) -> None:
     condition = deep(DEEPEST, wrap)
     assert DEEPEST == 50
     assert the_rule(written(rule(condition))).asks == (condition,)
@@ -104,7 +104,7 @@ def test_a_rule_whose_roles_were_renamed_is_the_same_rule() -> None:
     assert found.does == ("MOVE", (cup, place))
 
 
-def test_short_names_are_the_ends_of_iris_where_nobody_knows_better() -> None:
+def test_short_names_are_the_ends_of_iris_if_no_scene_defines_others() -> None:
     reader = RuleReader({}, None)
     assert reader.short("https://x.org/k#Cup") == "Cup"
     assert reader.short("https://x.org/Cup") == "Cup"
@@ -113,7 +113,7 @@ def test_short_names_are_the_ends_of_iris_where_nobody_knows_better() -> None:
     assert {one.does for one in plain.said.values() if isinstance(one, Rule)} == {("MOVE", ("?cup", "?place"))}
 
 
-def test_a_method_keeps_its_steps_and_who_fills_its_open_roles() -> None:
+def test_a_method_keeps_its_steps_and_its_open_roles() -> None:
     opened = (OpenRole("Hand", None, "HOLDS"), OpenRole("Place", ("AT", (1, 0)), None), OpenRole("Cup", None, None))
     method = Method("MOVE", 2, (("PICK", (2, 0)), ("SWAP", (0, 1, 2, 3)), ("WAIT", ())), opened)
     found = read(written(method)).said
@@ -140,7 +140,7 @@ def test_a_method_keeps_its_steps_and_who_fills_its_open_roles() -> None:
         (r"m:counter_\S+ a owl:NamedIndividual, :Counter", "m:other a :Counter", "lacks a part"),
     ],
 )
-def test_a_part_that_is_missing_or_cannot_be_is_named(old: str, new: str, said: str) -> None:
+def test_a_missing_or_impossible_part_of_a_memory_is_named(old: str, new: str, said: str) -> None:
     text = written(rule(RelationCondition("near", ("?cup",))))
     assert re.search(old, text)
     with pytest.raises(KnowledgeError, match=re.escape(said)):
@@ -156,13 +156,13 @@ def test_a_method_names_no_role_that_it_lacks(role: int, place: int) -> None:
         read(edited)
 
 
-def test_probabilities_have_half_a_choice_and_half_a_pass_behind_them() -> None:
+def test_probabilities_add_half_a_success_and_half_a_failure_to_the_counts() -> None:
     assert probability(Tally()) == 0.5
     assert probability(Tally(chosen=1, passed_over=2, failed=1)) == 1.5 / 5
     assert ":probability 0.7500 ." in written(rule())
 
 
-def test_a_memory_says_who_learns_whom_it_trusts_and_how_much_was_lived(tmp_path: Path) -> None:
+def test_a_memory_names_its_learner_its_trusted_sources_and_its_numbers_of_episodes(tmp_path: Path) -> None:
     experience = Experience("robot 1")
     for _ in range(3):
         experience.learn(Lesson([rule()], [(rule(), ("cup is", "full"), Tally(1))]))
@@ -183,7 +183,7 @@ def test_a_memory_says_who_learns_whom_it_trusts_and_how_much_was_lived(tmp_path
     assert {who for who, _ in read("".join(turtle(experience, NAMES, DOMAIN, only="robot 1"))).counts} == {"robot 1"}
 
 
-def test_numbers_are_counted_as_far_as_floating_point_numbers_are_exact() -> None:
+def test_counts_are_read_up_to_the_limit_of_exact_floating_point_numbers() -> None:
     assert float(MOST - 1) != float(MOST) == float(MOST + 1)
     text = written(rule())
     assert read(re.sub(":chosen 1 ", f":chosen {MOST - 1} ", text)).totals()[rule().name][ITSELF] == Tally(MOST - 1)
@@ -202,7 +202,7 @@ def test_counters_may_have_any_names(space: str) -> None:
     assert read(again) == read(text)
 
 
-def test_what_is_read_of_a_file_cannot_be_changed() -> None:
+def test_the_parsed_content_of_a_memory_file_is_immutable() -> None:
     with pytest.raises(FrozenInstanceError):
         lines(written(rule())).rest = ""  # type: ignore[misc]
 
@@ -220,7 +220,7 @@ def test_a_fact_is_written_once_and_read_from_any_layout() -> None:
     assert read(other.decode()) == experience
 
 
-def test_of_two_copies_of_a_memory_in_one_file_the_larger_counts_hold() -> None:
+def test_two_copies_of_a_memory_in_one_file_give_the_larger_counts() -> None:
     early = Experience("robot")
     early.learn(Lesson([rule()], [(rule(), ITSELF, Tally(2, 1))]))
     before = "".join(turtle(early, NAMES, DOMAIN))
@@ -229,7 +229,7 @@ def test_of_two_copies_of_a_memory_in_one_file_the_larger_counts_hold() -> None:
     assert read(before + after) == read(after + before) == early
 
 
-def test_the_lines_of_the_papers_links_are_left_to_who_reads_them() -> None:
+def test_the_lines_of_the_papers_links_are_kept_apart_for_their_own_reader() -> None:
     link = "_:link1 <https://x.org/a> <https://x.org/b> .\n"
     found = lines(written(rule()) + link)
     assert found.paper == link
@@ -237,7 +237,7 @@ def test_the_lines_of_the_papers_links_are_left_to_who_reads_them() -> None:
     assert found.links == [(found.links[0][0], rule().name, Tally(1))]
 
 
-def test_a_file_that_is_no_text_or_not_there_says_what_to_do(tmp_path: Path) -> None:
+def test_a_missing_or_binary_memory_file_is_a_clear_error(tmp_path: Path) -> None:
     with pytest.raises(KnowledgeError, match=r"m\.ttl: no such memory file; 'confab learn' makes one"):
         load(tmp_path / "m.ttl")
     (tmp_path / "m.ttl").write_bytes(b"\xff\xfe\x00")
@@ -254,7 +254,7 @@ def test_a_deleted_rule_takes_its_counts_with_it_and_nothing_else() -> None:
     assert found.totals().keys() == {kept.name}
 
 
-def test_a_rule_that_another_editor_deleted_with_all_that_names_it_leaves_the_rest_of_the_memory() -> None:
+def test_the_rest_of_a_memory_is_read_after_an_editor_deleted_a_rule_and_all_triples_about_it() -> None:
     kept = GoalKind("AT", ("Cup", "Day"))
     named = f"#{rule().name}>"
     triples = [str(triple) for triple in lines(written(rule(), kept)).triples]

@@ -15,7 +15,7 @@ from confab.reasoner.symbols import Symbol
 CUP2 = Symbol("LOCATION", ("cup2",))
 
 
-def test_what_was_observed_replaces_the_value_of_the_scene(tmp_path: Path) -> None:
+def test_an_observed_value_replaces_the_value_of_the_scene(tmp_path: Path) -> None:
     graph = load("beverage-serving")
     reading = read(graph)
     save_observed(tmp_path / "observed.ttl", {CUP2: "location8"}, reading.names, graph.scene)
@@ -24,7 +24,7 @@ def test_what_was_observed_replaces_the_value_of_the_scene(tmp_path: Path) -> No
     assert replace(seen.problem, initial={**seen.problem.initial, CUP2: "location1"}) == reading.problem
 
 
-def test_the_graph_says_where_things_were_seen_and_the_scene_keeps_its_own() -> None:
+def test_the_graph_has_the_observed_places_and_the_scene_keeps_its_own() -> None:
     graph = load("beverage-serving")
     reading = read(graph)
     assert_observed(graph, {CUP2: "location8"}, reading.names)
@@ -48,7 +48,7 @@ def test_observations_of_another_scene_are_refused(tmp_path: Path) -> None:
         load_observed(tmp_path / "none.ttl", reading)
 
 
-def test_a_value_that_nothing_has_is_not_observed(tmp_path: Path) -> None:
+def test_an_observed_value_that_is_not_declared_is_refused(tmp_path: Path) -> None:
     graph = load("beverage-serving")
     reading = read(graph)
     save_observed(tmp_path / "observed.ttl", {CUP2: "location8"}, reading.names, graph.scene)
@@ -58,7 +58,7 @@ def test_a_value_that_nothing_has_is_not_observed(tmp_path: Path) -> None:
         load_observed(tmp_path / "observed.ttl", reading)
 
 
-def test_a_file_that_says_what_may_be_is_not_what_was_seen(tmp_path: Path) -> None:
+def test_a_file_with_two_values_of_a_fact_is_refused_as_observation(tmp_path: Path) -> None:
     graph = load("beverage-serving")
     reading = read(graph)
     links = Links({("B1_MOVE", ("cup2", "location5")): {CUP2: {"location1": 0.5, "location8": 0.5}}})

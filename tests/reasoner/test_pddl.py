@@ -165,7 +165,7 @@ def test_predicates_that_exclude_each_other_become_one_situation_type() -> None:
     assert {"t", "a", "b", "c", "no_at"} == set(problem.classes["AT"])
 
 
-def test_look_alikes_stay_apart() -> None:
+def test_predicates_that_can_hold_together_stay_separate_situation_types() -> None:
     domain = """(define (domain lift) (:predicates (boarded ?p) (served ?p) (waiting ?p))
       (:action board :parameters (?p) :precondition (waiting ?p) :effect (boarded ?p))
       (:action leave :parameters (?p) :precondition (boarded ?p) :effect (and (not (boarded ?p)) (served ?p))))"""
@@ -233,7 +233,7 @@ def test_costs_that_depend_on_objects_are_kept() -> None:
 
 
 @pytest.mark.parametrize("path", given_problems(), ids=lambda p: str(p.relative_to(GIVEN)))
-def test_given_domains_go_in_and_out(path: Path, tmp_path: Path) -> None:
+def test_given_domains_survive_import_and_export(path: Path, tmp_path: Path) -> None:
     found = given(path)
     scene = tmp_path / f"{found.problem.scene.rsplit('/', 1)[-1]}.ttl"
     scene.write_text(turtle(found.problem, "title", "description", found.said))
@@ -283,7 +283,7 @@ def test_unsupported_features_are_refused_by_name() -> None:
         parse(domain, "(define (problem e) (:domain d) (:init) (:goal (p)))")
 
 
-def test_requirements_that_nothing_uses_do_no_harm() -> None:
+def test_unused_requirements_of_pddl_are_ignored() -> None:
     domain = DOMAIN.replace("(:types", "(:requirements :strips :derived-predicates :durative-actions) (:types", 1)
     assert parse(domain.format("(p ?x)", "(p ?x)"), PROBLEM.format("", "(p o)")).objects == {"o": "a"}
 
@@ -316,7 +316,7 @@ def bound(problem: Problem, plan: Plan) -> Iterator[Step]:
 
 
 @pytest.mark.parametrize("level", [1, 2, 3])
-def test_a_level_of_the_tabletop_goes_out_and_its_plans_come_back(level: int, tmp_path: Path) -> None:
+def test_a_level_of_the_tabletop_is_exported_and_its_plans_are_imported(level: int, tmp_path: Path) -> None:
     problem = tabletop()
     domain, task = export_pddl(problem, level, tmp_path)
     exported = to_pddl(problem, level)
@@ -339,7 +339,7 @@ def test_an_unknown_level_is_refused(tmp_path: Path) -> None:
         export_pddl(tabletop(), 7, tmp_path)
 
 
-def test_a_derived_predicate_is_followed_and_what_changes_it_directly_is_refused() -> None:
+def test_derived_predicates_are_planned_with_and_a_circular_derivation_is_refused() -> None:
     found = solve(Request(imported(parse(*BOXES)).problem))
     assert found.status is Status.SOLVED
     assert found.plan is not None

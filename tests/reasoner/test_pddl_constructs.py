@@ -444,7 +444,7 @@ def test_a_construct_is_planned(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", CONSTRUCTS)
-def test_a_construct_goes_in_and_out(name: str, tmp_path: Path) -> None:
+def test_a_construct_survives_import_and_export(name: str, tmp_path: Path) -> None:
     found = imported(parse(*texts(name)))
     scene = tmp_path / "e.ttl"
     scene.write_text(turtle(found.problem, "title", "description", found.said))
@@ -477,7 +477,7 @@ def test_a_cost_with_many_values_is_one_price() -> None:
         ("(q a)", "a Q true can't be reached: F requires a P false, which never holds"),
     ],
 )
-def test_what_can_not_end_is_said_to_be_the_reason(goal: str, reason: str) -> None:
+def test_a_permanent_fact_is_given_as_the_reason(goal: str, reason: str) -> None:
     domain = """(define (domain d) (:predicates (p ?x) (q ?x))
      (:action f :parameters (?x) :precondition (not (p ?x)) :effect (q ?x))
      (:action g :parameters (?x) :precondition (q ?x) :effect (not (p ?x))))"""
@@ -495,13 +495,13 @@ def test_what_can_not_end_is_said_to_be_the_reason(goal: str, reason: str) -> No
         ("(:types a - b b - a)", "domain:1:28: type 'a' is above itself"),
     ],
 )
-def test_types_that_can_not_be_are_refused_with_their_place(domain: str, message: str) -> None:
+def test_impossible_types_are_refused_with_their_place(domain: str, message: str) -> None:
     with pytest.raises(PddlError) as refused:
         parse(f"(define (domain d) {domain})", "(define (problem e) (:domain d) (:init) (:goal ()))")
     assert str(refused.value) == message
 
 
-def test_of_a_goal_all_facts_are_goals_of_their_own_also_those_for_all_objects() -> None:
+def test_each_fact_of_a_conjunctive_goal_is_a_goal_also_below_forall() -> None:
     domain = """(define (domain d) (:requirements :adl) (:types a b)
      (:predicates (p ?x - a) (q ?x - a ?y - b) (heavy ?x - a))
      (:action f :parameters (?x - a) :precondition (not (p ?x)) :effect (p ?x))
@@ -523,7 +523,7 @@ def test_of_a_goal_all_facts_are_goals_of_their_own_also_those_for_all_objects()
     assert sorted(step.behavior for step in outcome.plan.steps) == ["F", "F", "G", "G", "G", "REACH_GOAL"]
 
 
-def test_a_value_that_is_asked_for_twice_makes_one_parameter() -> None:
+def test_a_value_in_two_conditions_makes_one_parameter() -> None:
     domain = """(define (domain sky) (:requirements :strips :typing :negative-preconditions)
         (:types scope direction) (:predicates (at ?s - scope ?d - direction))
         (:action turn :parameters (?s - scope ?new ?old - direction)

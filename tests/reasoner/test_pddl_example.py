@@ -12,12 +12,12 @@ from confab.reasoner.validation.validate import validate
 EXAMPLE = Path(__file__).resolve().parents[2] / "docs" / "examples" / "ferry"
 
 
-def test_the_imported_file_is_what_import_writes(tmp_path: Path) -> None:
+def test_the_imported_file_of_the_example_equals_the_output_of_the_import(tmp_path: Path) -> None:
     import_pddl(EXAMPLE / "domain.pddl", EXAMPLE / "problem.pddl", tmp_path / "ferry.ttl", level=2)
     assert (tmp_path / "ferry.ttl").read_text() == (EXAMPLE / "ferry.ttl").read_text()
 
 
-def test_a_level_by_hand_on_top_of_an_import_is_valid_and_plans() -> None:
+def test_a_level_written_by_hand_above_an_import_is_valid_and_is_planned() -> None:
     assert {finding.rule for finding in validate([EXAMPLE / "ferry-levels.ttl"])} == {"from-level-without-rest"}
     scene = confab.load(EXAMPLE / "ferry-levels.ttl")
     plan = scene.plan().outcome.plan

@@ -86,7 +86,7 @@ def test_a_random_world_costs_the_same_behind_its_export_on_every_level(seed: in
     ("name", "status"),
     [("export-both-signs", Status.UNSOLVABLE), ("export-undeclared-constant", Status.SOLVED)],
 )
-def test_a_domain_means_the_same_imported_and_exported(tmp_path: Path, name: str, status: Status) -> None:
+def test_a_domain_keeps_its_meaning_when_it_is_imported_and_exported(tmp_path: Path, name: str, status: Status) -> None:
     files = CASES / name / "d.pddl", CASES / name / "p.pddl"
     found = imported(parse_files(*files)).problem
     assert plan_level(found).status is plan_level(round_trip(found)).status is status
@@ -94,7 +94,7 @@ def test_a_domain_means_the_same_imported_and_exported(tmp_path: Path, name: str
     assert validate([tmp_path / "scene.ttl"]) == []
 
 
-def test_an_import_that_could_not_be_planned_in_is_refused_and_writes_nothing(tmp_path: Path) -> None:
+def test_an_import_that_planning_could_not_use_is_refused_and_writes_no_file(tmp_path: Path) -> None:
     files = CASES / "import-unusable" / "d.pddl", CASES / "import-unusable" / "p.pddl"
     with pytest.raises(KnowledgeError) as refused:
         import_pddl(*files, tmp_path / "scene.ttl")
@@ -168,7 +168,7 @@ SWAP = Behavior(
         ([replace(JUMP, amounts=(AmountEffect("LOAD", ("?x",), "assign", Amount("LOAD", ("a",))),))], 2.0),
     ],
 )  # fmt: skip
-def test_a_behaviour_means_the_same_exported(behaviors: list[Behavior], cost: float) -> None:
+def test_an_exported_behaviour_keeps_its_meaning(behaviors: list[Behavior], cost: float) -> None:
     problem = problem_of(*behaviors)
     assert least(problem) == least(round_trip(problem)) == cost
 
@@ -182,7 +182,7 @@ def test_an_exported_amount_has_a_value_for_each_object_that_its_function_accept
     assert least(problem) == least(round_trip(problem)) == 2.0
 
 
-def test_rules_are_written_where_they_are_asked_for_unless_they_need_themselves() -> None:
+def test_rules_are_written_in_place_of_their_facts_unless_they_are_recursive() -> None:
     rule = Rule(
         "NEAR",
         (Parameter("?p", "Thing"),),
@@ -215,7 +215,7 @@ def test_rules_are_written_where_they_are_asked_for_unless_they_need_themselves(
         lambda name: {"a": "d", "b": "p", "m": "?", "n": "()", "o": ";"}[name],
     ],
 )
-def test_names_that_pddl_can_not_tell_apart_or_read_are_changed(names: Callable[[str], str]) -> None:
+def test_names_that_pddl_can_not_distinguish_or_read_are_changed(names: Callable[[str], str]) -> None:
     problem = problem_of(JUMP, names=names)
     exported = to_pddl(problem)
     assert set(exported.objects.values()) == {names(name) for name in "abmno"}

@@ -120,7 +120,7 @@ def planned(found: Imported, mode: str = "guarded") -> tuple[Status, list[str]]:
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_random_numeric_problems_are_solved_as_an_exhaustive_search_says(seed: int) -> None:
+def test_random_numeric_problems_have_the_answer_of_an_exhaustive_search(seed: int) -> None:
     domain, problem = pddl(seed)
     length = shortest(domain, problem)
     if length is None:
@@ -136,7 +136,7 @@ def test_random_numeric_problems_are_solved_as_an_exhaustive_search_says(seed: i
     assert len(plan_of(exported, "\n".join(steps))) == len(steps)
 
 
-def test_what_is_imported_is_read_back_from_turtle(tmp_path: Path) -> None:
+def test_an_imported_numeric_problem_is_read_back_from_turtle(tmp_path: Path) -> None:
     for seed in range(4):
         problem = imported(parse(*pddl(seed))).problem
         path = tmp_path / f"world{seed}.ttl"
@@ -167,12 +167,12 @@ def levels_and_total(effect: str) -> tuple[str, str]:
         ("(assign (total) (level ?x ?x))", "takes 1 arguments, got 2"),
     ],
 )
-def test_what_cant_be_planned_with_is_refused_by_name(domain: str, said: str) -> None:
+def test_invalid_numeric_expressions_are_refused_by_name(domain: str, said: str) -> None:
     with pytest.raises((PddlError, ValueError), match="(?s)" + said.replace("(", r"\(")):
         solve(Request(imported(parse(*levels_and_total(domain))).problem, "optimal"))
 
 
-def test_a_product_of_amounts_that_change_is_planned_state_by_state_without_a_bound() -> None:
+def test_a_task_with_a_product_of_changing_amounts_is_solved_without_a_bound() -> None:
     problem = imported(parse(*levels_and_total("(increase (total) (* (level ?x) (level ?x)))"))).problem
     outcomes = {mode: solve(Request(problem, mode)) for mode in ("guarded", "optimal", "paper")}
     assert {outcome.status for outcome in outcomes.values()} == {Status.SOLVED}

@@ -42,7 +42,7 @@ def test_ids_are_those_of_the_figures(level: int, number: int, text: str) -> Non
     assert f"{number} {text}" in [str(g) for g in quantify(graph, read(graph), level)]
 
 
-def test_the_query_can_be_read_and_run() -> None:
+def test_the_query_for_quantification_is_readable_and_runs() -> None:
     graph = load("beverage-serving")
     reading = read(graph)
     text = query_for(reading, reading.problem.domain.behaviors["B2_PICK"])

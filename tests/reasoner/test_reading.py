@@ -31,11 +31,11 @@ def test_every_situated_object_has_the_value_that_the_scene_states(serving: Read
     assert len(facts) == 14  # 4 objects x {location, beverage}, 2 hands x {content, position, tilt}
 
 
-def test_what_a_scene_does_not_say_of_a_hand_is_its_rest_value(serving: Reading) -> None:
+def test_a_hand_without_a_stated_value_has_its_rest_value(serving: Reading) -> None:
     assert serving.problem.initial[Symbol("HOLDS", ("left_hand",))] == "nothing"
 
 
-def test_values_of_later_levels_are_not_there_on_earlier_ones(serving: Reading) -> None:
+def test_values_of_lower_levels_do_not_exist_on_upper_levels(serving: Reading) -> None:
     location = Symbol("LOCATION", ("cup1",))
     assert len(serving.problem.values(location, 1)) == 8
     assert "in_hand" in serving.problem.values(location, 2)
@@ -46,11 +46,11 @@ def test_an_absence_condition_is_a_negated_witness(serving: Reading) -> None:
     assert [c.negated for c in conditions if isinstance(c, Witness)] == [True, False]
 
 
-def test_terms_are_short_names_that_lead_back_to_iris(serving: Reading) -> None:
+def test_short_names_of_terms_map_to_their_iris(serving: Reading) -> None:
     assert serving.names.iri("cup1") == "https://w3id.org/confab/beverage-serving#cup1"
 
 
-def test_a_goal_replaces_that_of_its_symbol(serving: Reading) -> None:
+def test_a_new_goal_replaces_the_goal_of_the_same_symbol(serving: Reading) -> None:
     problem = with_goals(serving.problem, ["cup2 LOCATION location8"])
     assert problem.goal[Symbol("LOCATION", ("cup2",))] == "location8"
     assert len(problem.goal) == len(serving.problem.goal)
@@ -68,7 +68,9 @@ def test_a_goal_replaces_that_of_its_symbol(serving: Reading) -> None:
         ("cup2", "is no fact"),
     ],
 )
-def test_a_fact_that_names_nothing_is_answered_with_the_nearest(serving: Reading, text: str, message: str) -> None:
+def test_the_message_on_a_fact_with_an_unknown_name_gives_the_most_similar_name(
+    serving: Reading, text: str, message: str
+) -> None:
     with pytest.raises(KnowledgeError, match=message):
         parse_fact(serving.problem, text)
 
@@ -84,7 +86,7 @@ def test_a_situated_object_needs_exactly_one_value(tmp_path: Path, stated: str, 
         read(load(path))
 
 
-def test_a_goal_that_something_is_not_so_of_which_it_cannot_be_so_asks_nothing(tmp_path: Path) -> None:
+def test_a_negated_goal_of_an_impossible_fact_adds_no_goal(tmp_path: Path) -> None:
     """A towel for which CLEAN doesn't exist isn't clean, with or without that goal."""
     scene = (SCENES / "drawers-small.ttl").read_text()
     goal = ":keepsakes.never a owl:NamedIndividual, c:ValueCondition ; c:about :album ; c:situationType d:OPENED ; c:negated true ."
@@ -93,7 +95,7 @@ def test_a_goal_that_something_is_not_so_of_which_it_cannot_be_so_asks_nothing(t
     assert read(load(path)).problem.goal == read(load("drawers-small")).problem.goal
 
 
-def test_what_a_scene_states_of_what_cannot_be_so_is_not_so(tmp_path: Path) -> None:
+def test_a_stated_fact_outside_of_the_class_of_its_situation_type_is_ignored(tmp_path: Path) -> None:
     """A drawer can be opened, an album can't; no fact follows from the statement that the album is open."""
     path = tmp_path / "mine.ttl"
     said = ":open_album a owl:NamedIndividual, c:SituatedObjectInstance ; c:about :album ; c:situationType d:OPENED ."
@@ -101,7 +103,7 @@ def test_what_a_scene_states_of_what_cannot_be_so_is_not_so(tmp_path: Path) -> N
     assert read(load(path)).problem.initial == read(load("drawers-small")).problem.initial
 
 
-def test_several_conditions_may_stand_together_wherever_one_stands(tmp_path: Path) -> None:
+def test_a_conjunction_may_replace_a_single_condition(tmp_path: Path) -> None:
     domain = (SCENES.parent / "domains" / "drawers.ttl").read_text()
     together = "c:precondition :L2_TAKE.all ;"
     found = domain.replace("c:precondition :L2_TAKE.empty, :L2_TAKE.isAt, :L2_TAKE.reachable ;", together)

@@ -63,7 +63,7 @@ def test_the_slice_has_a_plan_exactly_if_the_world_has_one(text: str) -> None:
     assert sliced.classes == {kind: tuple(m for m in members if m in kept) for kind, members in whole.classes.items()}
 
 
-def test_who_has_to_come_from_elsewhere_is_found(tmp_path: Path) -> None:
+def test_an_individual_that_has_to_move_to_a_needed_place_is_in_the_slice(tmp_path: Path) -> None:
     """To color x, an individual must be at the place of x; y can come from s1, which is near s0, but s0 isn't near s1."""
     text = (
         HEAD
@@ -99,7 +99,7 @@ def test_who_has_to_come_from_elsewhere_is_found(tmp_path: Path) -> None:
     assert solvable(sliced, 100)
 
 
-def test_what_a_class_is_defined_by_is_read(tmp_path: Path) -> None:
+def test_individuals_of_a_defined_class_are_in_the_slice_even_if_it_is_empty_initially(tmp_path: Path) -> None:
     """A behaviour that takes blue things needs the definition of blue; initially, no individual of the world is blue."""
     text = (
         HEAD
@@ -126,7 +126,7 @@ def test_what_a_class_is_defined_by_is_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("family", families())
-def test_clutter_is_left_out_and_nothing_else_that_moves(tmp_path: Path, family: str) -> None:
+def test_irrelevant_objects_are_left_out_of_the_slice_and_all_others_are_kept(tmp_path: Path, family: str) -> None:
     write_scene(tmp_path / "scene.ttl", family, objects=8, hands=3, clutter=30, seed=3)
     write_scene(tmp_path / "bare.ttl", family, objects=8, hands=3, seed=3)
     sliced, bare = recognise(load(tmp_path / "scene.ttl")), read(load(tmp_path / "bare.ttl"))
@@ -141,7 +141,7 @@ def test_clutter_is_left_out_and_nothing_else_that_moves(tmp_path: Path, family:
     assert sliced.problem.goal == bare.problem.goal
 
 
-def test_the_paper_s_scene_keeps_all_that_its_ids_count() -> None:
+def test_the_slice_of_the_papers_scene_keeps_the_initial_facts_and_the_ids_of_its_plan() -> None:
     graph = load("beverage-serving")
     whole, sliced = read(graph).problem, recognise(graph).problem
     assert sliced.initial == whole.initial
@@ -191,7 +191,7 @@ def test_a_task_on_one_of_two_tables_leaves_the_other_out(tmp_path: Path) -> Non
     assert problem.classes["Hand"] == ("hand1", "hand2")
 
 
-def test_what_a_changed_goal_names_is_read_too(tmp_path: Path) -> None:
+def test_an_object_that_a_changed_goal_names_is_in_the_slice(tmp_path: Path) -> None:
     path = tmp_path / "scene.ttl"
     write_scene(path, "served", clutter=3)
     graph, goals = load(path), ["thing2 LOCATION location7"]
@@ -228,7 +228,9 @@ def test_a_slice_names_its_individuals_as_the_whole_scene_does(tmp_path: Path) -
 
 
 @pytest.mark.parametrize("where", ["prefix", "import", "class"])
-def test_a_namesake_that_is_irrelevant_changes_the_name_in_the_slice_too(tmp_path: Path, where: str) -> None:
+def test_an_individual_has_the_same_name_in_the_slice_even_if_an_irrelevant_namesake_exists(
+    tmp_path: Path, where: str
+) -> None:
     """Another cup1 in a separate namespace is far away and isn't read.
 
     The cup1 of the task has the name that it has in the whole scene.
@@ -262,7 +264,7 @@ def test_a_namesake_that_is_irrelevant_changes_the_name_in_the_slice_too(tmp_pat
 
 
 @pytest.mark.parametrize("word", ["Task", "Level", "Parameter"])
-def test_a_class_may_be_called_like_a_part_of_the_model(tmp_path: Path, word: str) -> None:
+def test_a_class_may_have_the_name_of_a_term_of_the_model(tmp_path: Path, word: str) -> None:
     """The core's own classes of that name have no individuals in the problem, so they change no name."""
     text = generate("served").replace(":cup1 a owl:NamedIndividual, k:Cup", f":cup1 a owl:NamedIndividual, :{word}", 1)
     text += f":{word} a owl:Class ; rdfs:subClassOf k:Cup .\n"
@@ -271,7 +273,7 @@ def test_a_class_may_be_called_like_a_part_of_the_model(tmp_path: Path, word: st
     assert recognise(graph).problem.classes[word] == read(graph).problem.classes[word] == ("cup1",)
 
 
-def test_an_individual_may_be_called_like_a_property(tmp_path: Path) -> None:
+def test_an_individual_may_have_the_name_of_a_property(tmp_path: Path) -> None:
     scene = skeleton(tmp_path)
     scene.write_text(scene.read_text(encoding="utf-8").replace(":plate1", ":isAt"), encoding="utf-8")
     whole, part = read(load(scene)), recognise(load(scene))
@@ -288,7 +290,7 @@ def test_an_individual_may_be_called_like_a_property(tmp_path: Path) -> None:
         ("d:PLACE ; c:value :table", "", ""),
     ],
 )
-def test_a_goal_that_excludes_a_value_wants_the_one_that_is_left(
+def test_a_goal_that_excludes_all_values_but_one_requires_the_remaining_value(
     tmp_path: Path, excluded: str, more: str, wanted: str
 ) -> None:
     scene = skeleton(tmp_path)

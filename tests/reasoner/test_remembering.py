@@ -68,7 +68,7 @@ def lived(replica: str, episodes: int) -> Experience:
     return experience
 
 
-def test_experience_survives_the_file_in_our_layout_and_in_any_other(tmp_path: Path) -> None:
+def test_experience_survives_a_round_trip_in_any_layout_of_the_file(tmp_path: Path) -> None:
     experience = lived("robot", 4)
     save(tmp_path / "ours.ttl", experience, NAMES, DOMAIN)
     rdflib.Graph().parse(tmp_path / "ours.ttl").serialize(tmp_path / "theirs.ttl")
@@ -76,7 +76,7 @@ def test_experience_survives_the_file_in_our_layout_and_in_any_other(tmp_path: P
     assert load(tmp_path / "theirs.ttl", NAMES) == experience
 
 
-def test_a_rule_can_be_asked_for_in_the_words_of_conditions(tmp_path: Path) -> None:
+def test_a_learned_rule_can_be_queried_by_its_conditions(tmp_path: Path) -> None:
     save(tmp_path / "now.ttl", lived("robot", 2), NAMES, DOMAIN)
     graph = rdflib.Graph().parse(tmp_path / "now.ttl")
     asked = """PREFIX : <https://w3id.org/confab/core#> SELECT ?class ?failed WHERE {
@@ -88,7 +88,9 @@ def test_a_rule_can_be_asked_for_in_the_words_of_conditions(tmp_path: Path) -> N
     ]
 
 
-def test_an_edited_rule_keeps_its_counts_a_disabled_one_says_so_and_a_deleted_one_is_gone(tmp_path: Path) -> None:
+def test_an_edited_rule_keeps_its_counts_a_disabled_rule_is_marked_and_a_deleted_rule_is_removed(
+    tmp_path: Path,
+) -> None:
     path, experience = tmp_path / "memory.ttl", lived("robot", 2)
     save(path, experience, NAMES, DOMAIN)
     text = path.read_text()
@@ -137,7 +139,7 @@ def test_a_broken_foreign_or_newer_file_is_a_clear_error(tmp_path: Path, content
         (r":learnsAs \S+", ":label 1", "the ID of its replica, is missing"),
     ],
 )
-def test_counts_that_cant_be_and_nobody_who_learns_are_clear_errors(
+def test_impossible_counts_and_a_memory_without_learner_are_clear_errors(
     tmp_path: Path, old: str, new: str, message: str
 ) -> None:
     path = tmp_path / "memory.ttl"
@@ -149,14 +151,14 @@ def test_counts_that_cant_be_and_nobody_who_learns_are_clear_errors(
         load(path, NAMES)
 
 
-def test_a_byte_order_mark_is_no_harm(tmp_path: Path) -> None:
+def test_a_byte_order_mark_is_ignored(tmp_path: Path) -> None:
     path = tmp_path / "memory.ttl"
     save(path, lived("robot", 2), NAMES, DOMAIN)
     path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
     assert len(load(path, NAMES)) == len(lived("robot", 2))
 
 
-def test_a_file_cut_off_anywhere_is_an_error_or_whole(tmp_path: Path) -> None:
+def test_a_truncated_memory_file_is_an_error_or_a_part_of_the_memory(tmp_path: Path) -> None:
     experience = lived("robot", 2)
     path = tmp_path / "memory.ttl"
     save(path, experience, NAMES, DOMAIN)
@@ -223,6 +225,6 @@ def test_robots_that_write_to_one_endpoint_lose_nothing(endpoint: str) -> None:
     assert found == expected
 
 
-def test_an_endpoint_that_is_not_there_is_a_clear_error() -> None:
+def test_a_missing_endpoint_is_a_clear_error() -> None:
     with pytest.raises(KnowledgeError, match="no memory there"):
         pull("http://127.0.0.1:9/query", timeout=2)

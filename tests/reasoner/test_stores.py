@@ -169,7 +169,7 @@ def ask(url: str, **options: float) -> list[object]:
     return list(endpoint.query("SELECT ?x { ?x ?y ?z }", {}, {}))  # type: ignore[arg-type]
 
 
-def test_a_busy_server_is_asked_again(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_request_to_a_busy_server_is_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stores, "BACKOFF", 0.01)
     with stub(lambda _, number: (503, b"") if number < 3 else (200, GOOD)) as url:
         assert ask(url) == []
@@ -177,7 +177,7 @@ def test_a_busy_server_is_asked_again(monkeypatch: pytest.MonkeyPatch) -> None:
         ask(url)
 
 
-def test_a_lost_connection_is_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_request_is_repeated_after_a_lost_connection(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stores, "BACKOFF", 0.01)
 
     def reply(request: BaseHTTPRequestHandler, number: int) -> tuple[int, bytes]:
@@ -189,7 +189,7 @@ def test_a_lost_connection_is_tried_again(monkeypatch: pytest.MonkeyPatch) -> No
         assert ask(url) == []
 
 
-def test_a_server_that_is_down_or_slow_is_said_to_be() -> None:
+def test_a_server_that_is_down_or_slow_is_reported() -> None:
     with pytest.raises(KnowledgeError, match=r"nothing answers there .*is the server running") as caught:
         ask(f"http://user:secret@127.0.0.1:{free_port()}/query", retries=0)
     assert "secret" not in str(caught.value)
@@ -211,7 +211,7 @@ def test_a_server_that_is_down_or_slow_is_said_to_be() -> None:
         (200, b"<html>hello</html>", "no SPARQL 1.1 result"),
     ],
 )
-def test_a_wrong_answer_is_explained(status: int, body: bytes, message: str) -> None:
+def test_a_wrong_answer_of_a_server_is_explained(status: int, body: bytes, message: str) -> None:
     with stub(lambda *_: (status, body)) as url, pytest.raises(KnowledgeError, match=message):
         ask(url)
 
@@ -235,7 +235,7 @@ def test_an_answer_in_another_form_of_results_is_read_by_its_media_type() -> Non
 
 
 @pytest.mark.parametrize("drops", [1, 9])
-def test_an_answer_that_breaks_off_is_asked_for_again_and_then_said(drops: int) -> None:
+def test_an_answer_that_breaks_off_is_requested_again_and_then_reported(drops: int) -> None:
     def reply(request: BaseHTTPRequestHandler, number: int) -> tuple[int, bytes]:
         if number <= drops:
             request.send_response(200)
@@ -254,7 +254,7 @@ def test_an_answer_that_breaks_off_is_asked_for_again_and_then_said(drops: int) 
                 ask(url, retries=2)
 
 
-def test_an_answer_that_trickles_ends_with_the_limit() -> None:
+def test_an_answer_that_trickles_is_ended_by_the_time_limit() -> None:
     def reply(request: BaseHTTPRequestHandler, _: int) -> tuple[int, bytes]:
         request.send_response(200)
         request.end_headers()
@@ -270,7 +270,7 @@ def test_an_answer_that_trickles_ends_with_the_limit() -> None:
     assert time.monotonic() - begin < 5
 
 
-def test_data_that_change_while_they_are_read_are_never_planned_with(
+def test_data_that_change_while_they_are_read_are_never_used_for_planning(
     scene: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     import confab

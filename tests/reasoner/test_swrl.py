@@ -43,14 +43,14 @@ def yard(tmp_path: Path) -> Yard:
 
 @pytest.mark.slow
 @pytest.mark.skipif(not jars() or jvm() is None, reason="HermiT comes with the extra owlapi")
-def test_what_planning_derives_is_what_hermit_entails() -> None:
+def test_planning_derives_exactly_the_facts_that_hermit_entails() -> None:
     true, wrong = compared(first_problem(), range(12))
     assert set(true) == {kind[1:] for kind, _ in DEFINED.values()} | {k[1:] for k in CONCLUDED.values()} | {*PROPERTIES}
     assert wrong == {"search": [], "checker": [], "plain Python": []}
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_what_planning_derives_is_what_a_plain_reading_gives(seed: int) -> None:
+def test_planning_derives_exactly_the_facts_of_the_naive_interpreter(seed: int) -> None:
     problem = in_state(first_problem(), random_state(Random(seed)))
     truth = naive.complete(problem)
     plain = {s for s in truth if s.situation in problem.domain.rules and truth[s] == "true"}
@@ -70,7 +70,7 @@ def test_what_planning_derives_is_what_a_plain_reading_gives(seed: int) -> None:
         ("room1 CONTAINS cup2", 1),
     ],
 )
-def test_plans_lead_to_what_is_defined(yard: Yard, goal: str, steps: int) -> None:
+def test_plans_achieve_defined_goals(yard: Yard, goal: str, steps: int) -> None:
     for reading in (read(load(yard(""))), recognise(load(yard("")), [goal])):
         plan = solve(Request(with_goals(reading.problem, [goal]))).plan
         assert plan is not None
@@ -81,7 +81,7 @@ def rules(path: Path, situation: str) -> tuple[Rule, ...]:
     return read(load(path)).problem.domain.rules[situation]
 
 
-def test_a_variable_is_determined_by_a_value_and_else_sought(yard: Yard) -> None:
+def test_a_variable_of_a_swrl_rule_is_bound_by_a_value_or_becomes_a_witness(yard: Yard) -> None:
     more = implies(":sees ?h ?x", ":liesIn ?x ?p", ":liesIn ?y ?p", ":near ?h ?p", "different ?x ?y", ":Cup ?y")
     rule = next(rule for rule in rules(yard(more), "SEES") if len(rule.conditions) == 3)
     assert [term.name for term in rule.variables] == ["?p"]
@@ -137,7 +137,7 @@ def test_amounts_are_computed_and_compared(yard: Yard, built_in: str, guarded: b
         (counted("equal", "<urn:swrl:var#x>"), r"nothing says which number \?x is"),
     ],
 )  # fmt: skip
-def test_a_rule_that_planning_doesnt_evaluate_is_refused_with_its_mend(yard: Yard, more: str, said: str) -> None:
+def test_a_rule_that_planning_does_not_evaluate_is_refused_with_its_remedy(yard: Yard, more: str, said: str) -> None:
     with pytest.raises(KnowledgeError, match=said):
         read(load(yard(more)))
 
@@ -158,7 +158,7 @@ KEPT = """
 """
 
 
-def test_a_class_that_is_defined_by_itself_is_followed_step_by_step(yard: Yard) -> None:
+def test_a_goal_on_a_recursively_defined_class_is_achieved(yard: Yard) -> None:
     path = yard(KEPT.format(held="Kept", inner="Kept", other="[ a owl:Class ; owl:complementOf :Kept ]"))
     problem = with_goals(read(load(path)).problem, ["cup1 KEPT", "cup1 LIES_IN box3"])
     plan = solve(Request(problem)).plan
@@ -178,7 +178,7 @@ def test_a_class_that_is_defined_by_itself_is_followed_step_by_step(yard: Yard) 
         ),
     ],
 )  # fmt: skip
-def test_classes_that_are_defined_by_each_other_are_refused_where_nothing_tells_who_is_in_them(
+def test_a_recursive_class_without_situation_type_or_through_negation_is_refused(
     yard: Yard, more: str, said: str
 ) -> None:
     with pytest.raises(KnowledgeError, match=said):

@@ -60,7 +60,7 @@ def small() -> Problem:
     )  # fmt: skip
 
 
-def test_values_cannot_be_changed_and_what_is_not_said_of_them_is_plain() -> None:
+def test_values_of_a_problem_are_immutable_and_have_plain_defaults() -> None:
     kinds = [kind for kind in vars(symbols).values() if isinstance(kind, type) and is_dataclass(kind)]
     assert len(kinds) > 15
     for kind in kinds:
@@ -74,14 +74,14 @@ def test_values_cannot_be_changed_and_what_is_not_said_of_them_is_plain() -> Non
     assert Behavior("DO", 1, ()).cost == 1.0
 
 
-def test_facts_and_steps_are_said_as_people_write_them() -> None:
+def test_facts_and_steps_are_printed_in_the_notation_of_users() -> None:
     near = Symbol("NEAR", ("cup1", "shelf"))
     assert str(near) == "<cup1, shelf, NEAR>"
     assert str(Fact(near, TRUE)) == "cup1 NEAR shelf true"
     assert str(GroundBehavior(22, "PUT", ("cup1", "table"))) == "22 PUT cup1 table"
 
 
-def test_ids_count_behaviours_then_parameters_as_they_are_declared_on_each_level_anew() -> None:
+def test_ids_count_behaviours_and_arguments_in_declared_order_separately_for_each_level() -> None:
     problem = replace(small(), domain=replace(small().domain, first_ids={2: 7}))
     ids = {
         (name, arguments): problem.id_of(name, arguments)
@@ -100,7 +100,7 @@ def test_ids_count_behaviours_then_parameters_as_they_are_declared_on_each_level
         problem.id_of("PUT", ("cup1",))
 
 
-def test_levels_are_those_that_have_behaviours() -> None:
+def test_the_levels_of_a_domain_are_those_with_behaviours() -> None:
     domain = small().domain
     assert domain.levels == (1, 2)
     assert [b.name for b in domain.at_level(1)] == ["BRING", "WAIT"]
@@ -122,7 +122,7 @@ def test_a_level_sees_what_exists_on_it() -> None:
     assert problem.members("Plate") == frozenset()
 
 
-def test_what_a_level_finds_at_rest_is_to_be_so_in_the_end_but_for_what_is_wanted_otherwise() -> None:
+def test_values_at_rest_initially_are_goals_of_their_level_unless_a_goal_requires_another_value() -> None:
     problem = small()
     assert problem.at_rest(1) == {}
     # The second lamp is off although no fact states it, and the level can change that; no behaviour makes cups hot.
@@ -133,7 +133,7 @@ def test_what_a_level_finds_at_rest_is_to_be_so_in_the_end_but_for_what_is_wante
     assert Symbol("LIT", ("lamp2",)) not in stated.at_rest(2)
 
 
-def test_effects_stand_in_the_order_in_which_they_are_made() -> None:
+def test_effects_are_sorted_in_the_order_in_which_they_are_applied() -> None:
     true, false, other = becomes("LIT", "?l", TRUE), becomes("LIT", "?l", FALSE), becomes("AT", "?c", "?p")
     grow, double, fix = (AmountEffect("FILL", ("?c",), how, HALF) for how in ("increase", "scale", "assign"))
     made = replace(behavior("DO", 1, "?l:Lamp", [], [true, other, false]), amounts=(grow, double, fix))
@@ -150,7 +150,7 @@ def test_conditions_of_effects_are_conditions_of_the_behaviour() -> None:
     assert made.kinds == {"?c": "Cup", "?l": "Lamp"}
 
 
-def test_a_rule_is_a_behaviour_that_makes_its_situation_type_true() -> None:
+def test_a_rule_as_a_behaviour_makes_its_situation_type_true() -> None:
     condition = has("AT", "?c", "?p")
     rule = Rule("STANDS", (Parameter("?c", "Cup"),), (Parameter("?p", "Place"),), (condition,))
     made = rule.behavior
@@ -159,7 +159,7 @@ def test_a_rule_is_a_behaviour_that_makes_its_situation_type_true() -> None:
     assert made.effects == (ValueEffect("STANDS", ("?c",), TRUE),)
 
 
-def test_what_a_price_asks_is_told_from_what_the_behaviour_asks() -> None:
+def test_the_condition_of_a_price_is_separated_from_the_other_preconditions() -> None:
     free = behavior("DO", 1, "?c:Cup", [has("AT", "?c", "shelf")], [])
     assert free.priced is None
     assert free.asked == free.preconditions
@@ -173,7 +173,7 @@ def test_what_a_price_asks_is_told_from_what_the_behaviour_asks() -> None:
 
 
 @pytest.mark.parametrize("negated", [False, True])
-def test_terms_are_put_in_everywhere_and_nothing_else_changes(negated: bool) -> None:
+def test_substitution_replaces_terms_in_every_kind_of_condition(negated: bool) -> None:
     put = {"?a": "cup1", "?b": "shelf"}
     fill, way = Amount("FILL", ("?a",)), Measure("way", ("?a", "?b"))
     pairs: list[tuple[Condition, Condition]] = [
@@ -201,7 +201,7 @@ def test_terms_are_put_in_everywhere_and_nothing_else_changes(negated: bool) -> 
         assert substituted(before, put) == after
 
 
-def test_who_is_looked_for_is_neither_replaced_nor_confused_with_what_is_put_in() -> None:
+def test_substitution_neither_replaces_nor_captures_the_variable_of_a_witness() -> None:
     free = Witness("?o", "Cup", (has("AT", "?o", "?p"),), negated=True)
     assert substituted(free, {"?o": "cup1"}) == free
     captured = substituted(free, {"?p": "?o"})
@@ -213,7 +213,7 @@ def test_who_is_looked_for_is_neither_replaced_nor_confused_with_what_is_put_in(
 # -------------------------------------------------------------------------------------------------- spread and allowed
 
 
-def test_an_effect_on_each_of_a_class_is_one_effect_for_every_individual() -> None:
+def test_an_effect_on_a_class_becomes_one_effect_for_each_individual() -> None:
     each = Parameter("?x", "Cup")
     moved = ValueEffect("AT", ("?x",), "?p", (has("AT", "?x", "tray"),), each)
     same = ValueEffect("TOLD", ("tray",), "?x", (), each)
@@ -242,7 +242,7 @@ def test_an_effect_on_each_of_a_class_is_one_effect_for_every_individual() -> No
     ("preconditions", "effects"),
     [([has("AT", "cup1", "shelf")], []), ([], [becomes("AT", "cup1", "shelf")]), ([], [becomes("ON", "tray", "cup1")])],
 )
-def test_who_is_named_besides_is_not_only_one_of_a_class(
+def test_an_individual_that_another_condition_or_effect_names_is_not_in_the_spread(
     preconditions: list[Condition], effects: list[ValueEffect]
 ) -> None:
     moved = ValueEffect("AT", ("?x",), "?p", (), Parameter("?x", "Cup"))
@@ -261,7 +261,7 @@ FILL, SIZE = Amount("FILL", ("?c",)), Measure("size", ("?c",))
         ("scale", HALF, Calculation("*", FILL, HALF)),
     ],
 )
-def test_what_changes_an_amount_asks_that_it_stays_within_its_bounds(
+def test_a_behaviour_that_changes_an_amount_requires_that_it_stays_within_its_bounds(
     operation: str, by: Expression, after: Expression
 ) -> None:
     def asked(least: Fraction | None, most: Fraction | None, when: tuple[Condition, ...] = ()) -> tuple[Condition, ...]:
@@ -278,14 +278,14 @@ def test_what_changes_an_amount_asks_that_it_stays_within_its_bounds(
     assert asked(Fraction(0), None, when=when) == (AnyOf(((*when, replace(least, negated=False)),), negated=True),)
 
 
-def test_an_assigned_amount_is_held_within_bounds_where_there_is_one() -> None:
+def test_an_assigned_amount_has_to_be_within_its_bounds_if_the_amount_exists() -> None:
     kinds = {"FILL": SituationType("FILL", ("Cup",), "FILL", quantity=Quantity("", least=Fraction(0)))}
     (asked,) = allowed(Behavior("FIX", 1, (), amounts=(AmountEffect("FILL", ("?c",), "assign", SIZE),)), kinds)
     there = Comparison(FILL, "=", FILL)
     assert asked == AnyOf(((there, Comparison(SIZE, "<", Fraction(0))),), negated=True)
 
 
-def test_bounds_that_conditions_cannot_say_are_left_to_who_applies_the_effects() -> None:
+def test_bounds_that_no_condition_can_express_add_no_precondition() -> None:
     kinds = {
         name: SituationType(name, ("Cup",), name, quantity=Quantity("", least=Fraction(0))) for name in ("FILL", "HEAT")
     }

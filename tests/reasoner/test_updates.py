@@ -55,7 +55,7 @@ def again(graph: KnowledgeGraph, iri: str, behavior: Behavior, prefixes: dict[st
 
 @given(seed=st.integers(0, 10**9))
 @settings(max_examples=settings().max_examples // 5)
-def test_any_behavior_comes_back_from_its_update_as_it_was(seed: int) -> None:
+def test_any_behavior_survives_a_round_trip_through_its_update(seed: int) -> None:
     with TemporaryDirectory() as folder:
         path = Path(folder) / "random.ttl"
         path.write_text(turtle(replace(language(seed, 1), scene=RANDOM), "random", "random"))
@@ -70,7 +70,7 @@ def test_any_behavior_comes_back_from_its_update_as_it_was(seed: int) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in (ontology.ROOT / "domains").glob("*.ttl")))
-def test_every_shipped_behavior_comes_back_from_its_update_as_it_was(name: str) -> None:
+def test_every_shipped_behavior_survives_a_round_trip_through_its_update(name: str) -> None:
     graph = load(ontology.ROOT / "domains" / f"{name}.ttl")
     for iri, behavior in behaviors(graph).items():
         if iri.rpartition("#")[0] == graph.scene:
@@ -78,7 +78,7 @@ def test_every_shipped_behavior_comes_back_from_its_update_as_it_was(name: str) 
             assert found == plainly(behavior), written
 
 
-def test_a_file_converted_there_and_back_says_the_same_and_keeps_what_isnt_a_behavior(tmp_path: Path) -> None:
+def test_a_file_converted_to_updates_and_back_keeps_its_behaviors_and_all_other_lines(tmp_path: Path) -> None:
     path = ontology.ROOT / "domains" / "towers.ttl"
     before, short, long = behaviors(load(path)), tmp_path / "short.ttl", tmp_path / "long.ttl"
     short.write_text(convert(path, "sparql").text)
@@ -96,7 +96,7 @@ def test_a_file_converted_there_and_back_says_the_same_and_keeps_what_isnt_a_beh
     assert "c:update" not in long.read_text()
 
 
-def test_effects_on_all_of_a_class_are_said_by_the_class() -> None:
+def test_effects_on_all_individuals_of_a_class_are_written_with_the_class() -> None:
     graph = load(THEATRE)
     found = convert(THEATRE, "sparql")
     assert found.notes == []
@@ -191,7 +191,7 @@ ALIKE = [
 
 
 @pytest.mark.parametrize(("one", "other"), ALIKE)
-def test_what_sparql_can_say_in_two_ways_is_the_same_condition(tmp_path: Path, one: str, other: str) -> None:
+def test_equivalent_sparql_forms_give_the_same_condition(tmp_path: Path, one: str, other: str) -> None:
     found = []
     for said in (one, other):
         assert faults(tmp_path, f"{HEAD} {said} }}") == []
@@ -230,14 +230,14 @@ def test_numbers_are_compared_and_changed(tmp_path: Path) -> None:
     }
 
 
-def test_parameters_are_what_begins_with_its_type_in_that_order(tmp_path: Path) -> None:
+def test_parameters_are_the_variables_whose_triples_begin_with_a_type_in_that_order(tmp_path: Path) -> None:
     text = "INSERT { ?tube :spot ?to } WHERE { ?to a :Slot . ?tube a :Tube ; :spot ?from ; :fits ?to . ?from a :Slot }"
     said = only(tmp_path, text)
     assert [(p.name, local_name(p.kind)) for p in said.parameters] == [("?to", "Slot"), ("?tube", "Tube")]
     assert [(v.name, local_name(v.kind)) for v in said.variables] == [("?from", "Slot")]
 
 
-def test_what_two_levels_share_is_said_once(tmp_path: Path) -> None:
+def test_a_behaviour_can_extend_a_behaviour_of_another_level(tmp_path: Path) -> None:
     faults(tmp_path, f"{HEAD}}}")
     text = (tmp_path / "small.ttl").read_text()
     more = (
@@ -255,7 +255,7 @@ def test_what_two_levels_share_is_said_once(tmp_path: Path) -> None:
         load(tmp_path / "small.ttl")
 
 
-def test_what_is_written_out_already_is_left_so(tmp_path: Path) -> None:
+def test_an_update_that_is_already_expanded_is_not_expanded_again(tmp_path: Path) -> None:
     said = only(tmp_path, f"{HEAD}}}")
     lines = load(tmp_path / "small.ttl").ntriples().splitlines(keepends=True)
     own = b"".join(line for line in lines if line.startswith(b"<https://example.org/small"))
@@ -264,7 +264,7 @@ def test_what_is_written_out_already_is_left_so(tmp_path: Path) -> None:
     assert plainly(found) == plainly(said)
 
 
-def test_a_store_elsewhere_has_the_text_alone(tmp_path: Path) -> None:
+def test_a_behaviour_of_a_remote_store_is_read_from_the_text_of_its_update(tmp_path: Path) -> None:
     said = only(tmp_path, f"{HEAD}}}")
     path = tmp_path / "small.ttl"
     graph = KnowledgeGraph("https://example.org/small")
@@ -287,7 +287,7 @@ class Elsewhere:
     def confirm(self) -> None: ...
 
 
-def test_validation_and_loading_say_a_fault_with_the_line_of_the_file(tmp_path: Path) -> None:
+def test_validation_and_loading_report_a_fault_of_an_update_with_its_line(tmp_path: Path) -> None:
     assert faults(tmp_path, HEAD + ".\n ?tube :spto ?slot }")
     path = tmp_path / "small.ttl"
     (finding,) = (finding for finding in validate([path]) if finding.serious)

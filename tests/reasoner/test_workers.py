@@ -52,7 +52,7 @@ def ended(number: int) -> bool:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the kernel's part is Linux's")
 @pytest.mark.parametrize("how", ["kill", "crash", "abort", "exit", "ctrl-c"])
-def test_a_process_ends_with_all_that_it_started_when_its_parent_ends_in_any_way(how: str) -> None:
+def test_a_process_and_its_children_end_when_its_parent_ends_in_any_way(how: str) -> None:
     parent = subprocess.Popen(
         [sys.executable, "-c", PARENT, how], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
     )
@@ -65,7 +65,7 @@ def test_a_process_ends_with_all_that_it_started_when_its_parent_ends_in_any_way
     assert ended(number)
 
 
-def test_the_end_of_a_process_is_that_of_all_that_it_started() -> None:
+def test_ending_a_process_ends_all_its_children() -> None:
     process = start([sys.executable, "-c", SLEEP], stdout=subprocess.PIPE)
     assert process.stdout is not None
     process.stdout.readline()
@@ -74,7 +74,7 @@ def test_the_end_of_a_process_is_that_of_all_that_it_started() -> None:
     end(process)  # a second call does nothing
 
 
-def test_what_is_tied_to_a_pipe_that_is_closed_already_never_begins(tmp_path: Path) -> None:
+def test_a_command_with_an_already_closed_pipe_never_begins(tmp_path: Path) -> None:
     reading, writing = os.pipe()
     os.close(writing)
     command = [sys.executable, "-ISs", LAUNCHER, str(reading), "1", "touch", str(tmp_path / "begun")]
@@ -100,7 +100,7 @@ def test_every_process_has_a_limit_of_cpu_time_and_memory() -> None:
         call(time.sleep, 60, timeout=0.3)
 
 
-def test_a_call_returns_or_raises_what_its_function_does_and_prints_nothing(capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_call_has_the_result_or_error_of_its_function_and_prints_nothing(capfd: pytest.CaptureFixture[str]) -> None:
     assert call(sorted, [2, 1]) == [1, 2]
     assert call(print, "aside") is None
     with pytest.raises(KeyError, match="'b'"):
@@ -108,7 +108,7 @@ def test_a_call_returns_or_raises_what_its_function_does_and_prints_nothing(capf
     assert capfd.readouterr().out == ""
 
 
-def test_a_command_that_isnt_there_is_an_exit_code(tmp_path: Path) -> None:
+def test_a_missing_command_gives_an_exit_code(tmp_path: Path) -> None:
     process = start([str(tmp_path / "none")], stderr=subprocess.PIPE)
     said = process.communicate()[1]
     assert process.returncode and b"No such file" in said
