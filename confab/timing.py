@@ -85,7 +85,7 @@ def needs_others_meanwhile(problem: Problem) -> bool:
 def may_overlap_by_need(problem: Problem) -> bool:
     """Return whether a condition or effect concerns the start or end of a step.
 
-    With such conditions and effects, overlapping steps may reach more goals.
+    If conditions or effects concern only the start or end of a step, overlapping steps may reach more goals.
     """
     return any(
         span is not Span.THROUGHOUT

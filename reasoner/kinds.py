@@ -2,7 +2,8 @@
 
 Reports, pictures and films contain the maker's name "Confab". Plans and verdicts have specific keys; memories and episodes have
 specific properties. Files for further editing (scenes, PDDL) end with a stamp: a comment with a hash of the content above the
-stamp. An edited file is therefore no longer recognised. Confab considers all other files as foreign.
+stamp. If a file is edited, its stamp no longer fits, and the file is no longer recognised. Confab considers all other files as
+foreign.
 """
 
 from __future__ import annotations

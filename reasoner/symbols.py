@@ -73,7 +73,7 @@ class Perceived:
     by : str
         The perceiver.
     exclusive : bool
-        Whether only one individual at a time can have a given value. Special values are excepted.
+        Whether only one individual at a time can have a given value, unless the value is a special value.
     special : tuple of (str, str)
         Pairs of a name and a special value, e.g. ``("valueInHand", "in_hand")``.
     """

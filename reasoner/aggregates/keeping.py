@@ -12,9 +12,9 @@ If the aggregated number is linear in the changing amounts (only additions and s
 total directly. The change is added for every tuple that satisfies the conditions after the behaviour. The changes are independent
 of each other.
 
-If the maximum of a count is 0, no tuple contributes before a behaviour, and a single contributing tuple violates the bound.
-Nothing is therefore subtracted from a count whose maximum is 0, and a tuple may be counted for several pairs. A tuple that only
-loses a value doesn't start to contribute, unless the condition on this value is negated.
+If the maximum of a count is 0, no tuple contributes before a behaviour, and a single contributing tuple violates the bound. From
+a count whose maximum is 0, nothing needs to be subtracted, and a tuple may be counted for several pairs. A tuple that only loses
+a value doesn't start to contribute, unless the condition on this value is negated.
 """
 
 from __future__ import annotations

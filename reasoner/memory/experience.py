@@ -10,11 +10,12 @@ Measured    durations of a behaviour: number of executions, mean and spread
 Experience  all learned items, with grow-only tallies by replica and epoch, which can be merged
 ==========  ===================================================================================================
 
-Rules, orders, methods and kinds of goals are named by a hash of their content. Equal items of two replicas therefore have equal
-names, and a union of the replicas merges equal items. An item has one tally per lifted fact (`Fact`). The tally of the empty fact
-counts all uses of the item; the tally of another fact counts only uses in which the individuals in the item's roles satisfied the
-fact. The weight of tallies of epoch 0 never decays. Each further epoch belongs to one episode of a replica. The tallies of a
-further epoch are preferences between individuals, for example between two hands; their weight decays with every later episode.
+Rules, orders, methods and kinds of goals are named by a hash of their content. Because of these names, equal items of two
+replicas have equal names, and a union of the replicas merges equal items. An item has one tally per lifted fact (`Fact`). The
+tally of the empty fact counts all uses of the item; the tally of another fact counts only uses in which the individuals in the
+item's roles satisfied the fact. The weight of tallies of epoch 0 never decays. Each further epoch belongs to one episode of a
+replica. The tallies of a further epoch are preferences between individuals, for example between two hands; their weight decays
+with every later episode.
 """
 
 from __future__ import annotations

@@ -129,8 +129,8 @@ def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
 
     A behaviour is relevant if it changes a relevant situation type; a rule is relevant if it derives a relevant situation type.
     All situation types in conditions and effects of relevant behaviours and rules are relevant. If facts of a situation type are
-    looked up by one of their terms, such as a place, an effect on such a fact may concern the slice. Routes therefore also lead
-    from the corresponding term of the effect to the behaviour's other terms.
+    looked up by one of their terms, such as a place, an effect on such a fact may concern the slice. In this case, routes also
+    lead from the effect's term at this position to the other terms of the behaviour.
 
     Parameters
     ----------
