@@ -108,6 +108,7 @@ DOORS = (
     Door("runs kept -o OUT", "out.html", REPORT),
     Door("verify one-arm-serving plan.json -o OUT", "out.json", VERDICTS, physics=True),
     Door("verify one-arm-serving plan.json --video OUT", "out.mp4", FILM, physics=True),
+    Door("verify one-arm-serving plan.json --memory OUT", "out.ttl", MEMORY, physics=True),
     Door(f"execute {SCENE} --save OUT", "out.ttl", EPISODE),
     Door(f"execute {SCENE} --report OUT", "out.html", REPORT),
     Door(f"execute {SCENE} --learn --memory OUT", "out.ttl", MEMORY),
