@@ -297,9 +297,9 @@ PLAN = {
     "result.save(FILE)": "save write dump to_file store export save_json to_path write_plan save_plan save_as "
     "persist write_to_file",
     "scene.read_plan(FILE)": "load from_file open read from_json parse load_plan from_dict loads read_plan",
-    "result.report(FILE)": "report html show_page page to_html view browse gantt",
-    "result.why(STEP)": "why explain justify reasons because explanation explain_step reason",
-    "result.why_not(WHAT)": "why_not whynot contrast alternatives alternative",
+    "scene.read_result(plan).report(FILE)": "report html show_page page to_html view browse gantt",
+    "scene.read_result(plan).why(STEP)": "why explain justify reasons because explanation explain_step reason",
+    "scene.read_result(plan).why_not(WHAT)": "why_not whynot contrast alternatives alternative",
     "result.cost": "cost total_cost metric price quality plan_cost value cost_per_step step_cost",
     "result.solved": "solved success is_solved found ok status",
     "result.timed": "schedule makespan timed duration timeline timed_actions start_times times total_time durations "
