@@ -1,14 +1,16 @@
 """The share of small faults in recognition, proofs and checkers that random worlds detect.
 
-`benchmarks.mutants` draws the faults. A separate process with one fault judges worlds until a result is wrong; without the
-fault, the same result is right. The process judges only worlds that execute the faulty statement, first those that have
-detected most faults. The results are stored in a file, so that a later run can continue. If the generator or the judge of
-worlds has changed, the later run tries the survivors again.
+`benchmarks.mutants` draws the faults; only faults in functions are tried. A forked process puts one fault into the loaded module,
+and judges worlds until a result is wrong; without the fault, the same result is right. The process judges only worlds that
+execute the faulty statement: first those that have detected most faults, then the fast ones, up to a budget of time. A checker
+judges plans or certificates that were made without the fault. The results are stored in a file, so that a later run can continue.
+If the generator or the judge of worlds has changed, the later run tries the survivors again.
 """
 
 from __future__ import annotations
 
 import ast
+import gc
 import hashlib
 import json
 import os
@@ -16,18 +18,28 @@ import resource
 import sys
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from importlib import import_module
-from itertools import islice
+from inspect import CO_OPTIMIZED
+from itertools import accumulate, islice
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
-from types import FrameType
+from time import process_time
+from types import CodeType, FunctionType
 from typing import Any, TypedDict
 
 from benchmarks.mutants import LIBRARIES, ROOT, Instead, faults, meaning
+from confab.planner.certificates import Certificate
+from confab.planner.certifying import KINDS
+from confab.reasoner.symbols import Problem
+from confab.scene import load
+from worlds import judging
+from worlds.false_certificates import accepted, corrupted, of_a_task_with_a_plan
 from worlds.interpreter import Interpreter, TooManyStatesError
 from worlds.mixed import RandomWorld, drawn
+from worlds.scenes import scene
 
 CHECKERS = sorted(f"planner/{file.name}" for file in (ROOT / "planner").glob("checked_*.py"))
 PARTS: dict[str, dict[str, str]] = {
@@ -42,17 +54,20 @@ PARTS: dict[str, dict[str, str]] = {
 
 A planner that gives up in a world without a plan counts as a fault of a proof.
 """
-FIRST, WORLDS, TRIED = 8_000_000, 200, 30
-"""First seed and number of worlds, and maximum number of worlds that are judged with a fault."""
+FIRST, WORLDS = 8_000_000, 200
+"""First seed and number of worlds."""
+BUDGET, PLANS = 2.0, 6
+"""CPU seconds of the worlds that are judged with a fault, as measured without the fault; number of changed copies of each plan."""
 SECONDS, WAITING = 60, 600.0
 """CPU seconds for the worlds of a fault, and seconds by the clock for a call on a busy machine."""
-CONSTRAINED = 0.3
-"""Share of worlds with a constraint on every state."""
+CONSTRAINED, MUTUAL = 0.3, 0.2
+"""Shares of worlds with a constraint on every state, and with situation types that define each other."""
 NOWHERE = "in no world: "
 """Result of a fault in a statement that no world executes."""
-Drawn = tuple[RandomWorld, Interpreter]
-Saying = dict[str, list[str]]
-"""The complaints about each world, by its seed."""
+NOTED = "_noted_lines"
+"""Name of the set of executed lines in an observed module."""
+Check = Callable[[], list[str]]
+"""A function that judges a world, and returns the complaints."""
 
 
 class Record(TypedDict):
@@ -62,6 +77,15 @@ class Record(TypedDict):
     results: dict[str, str]
 
 
+@dataclass(frozen=True)
+class Traced:
+    """The result of a world without a fault: complaints, CPU seconds, and the executed lines of each module."""
+
+    said: list[str]
+    seconds: float
+    lines: dict[str, list[int]]
+
+
 def kills(many: int, into: Path, chosen: Sequence[str] = ()) -> None:
     """Try `many` faults in each part, or in the chosen parts, and print the share of detected faults."""
     for name in LIBRARIES:
@@ -69,12 +93,10 @@ def kills(many: int, into: Path, chosen: Sequence[str] = ()) -> None:
     into.mkdir(parents=True, exist_ok=True)
     record = into / "mixed-mutants.json"
     known: dict[str, Record] = json.loads(record.read_text("utf-8")) if record.is_file() else {}
-    worlds = {seed: drawn(seed, constrained=CONSTRAINED) for seed in range(FIRST, FIRST + WORLDS)}
-    judging = hashed("".join(file.read_text("utf-8") for file in sorted((ROOT / "worlds").glob("*.py"))))
-    print(
-        "| part | module | faults tried | detected | without effect in these worlds | detected, share of the others |\n"
-        "|---|---|---|---|---|---|"
-    )
+    worlds = [drawn(seed, constrained=CONSTRAINED, mutual=MUTUAL) for seed in range(FIRST, FIRST + WORLDS)]
+    its_judge = [*sorted((ROOT / "worlds").glob("*.py")), Path(__file__)]
+    judge = hashed("".join(file.read_text("utf-8") for file in its_judge))
+    print("| part | module | faults tried | noticed | in no world | share of the others |\n|---|---|---|---|---|---|")
     for part, files in PARTS.items():
         if chosen and part not in chosen:
             continue
@@ -82,25 +104,24 @@ def kills(many: int, into: Path, chosen: Sequence[str] = ()) -> None:
         for mode in dict.fromkeys(files.values()):
             its = [file for file in files if files[file] == mode]
             texts = "".join((ROOT / file).read_text("utf-8") for file in its)
-            kept = into / f"mixed-{mode}-{hashed(judging + texts)}.json"
-            before, lines = traced(its, list(worlds.values()), mode, kept)
+            checks = {world.seed: check(world, meant, mode) for world, meant in worlds}
+            before = traced(its, checks, into / f"mixed-{mode}-{hashed(judge + texts)}.json")
             for file in its:
                 source = (ROOT / file).read_text("utf-8")
-                key = f"{file} {hashed(meaning(source))}"
-                found = known.setdefault(key, Record(worlds=judging, results={}))
-                if found["worlds"] != judging:
+                found = known.setdefault(f"{file} {hashed(meaning(source))}", Record(worlds=judge, results={}))
+                if found["worlds"] != judge:
                     found["results"] = {fault: said for fault, said in found["results"].items() if said == "noticed"}
-                    found["worlds"] = judging
+                    found["worlds"] = judge
                 best = Counter[int]()
-                for (name, number), text in islice(faults(source, Random(file)), -(-many // len(files))):
+                drawn_faults = (one for one in faults(source, Random(file)) if changes(source, one[1]))
+                for (name, number), text in islice(drawn_faults, -(-many // len(files))):
                     fault = f"{name.removeprefix('core/')}:{number}"
                     if fault not in found["results"]:
                         at, line = changed(source, text)
-                        where = statement(source, at)
-                        useful = [seed for seed in worlds if not where or not where.isdisjoint(lines[file][seed])]
-                        useful.sort(key=lambda seed: -best[seed])
-                        tried = {seed: worlds[seed] for seed in useful[:TRIED]}
-                        by = noticed(file, text, tried, mode, before)
+                        lines = statement(source, at)
+                        useful = [seed for seed, one in before.items() if not lines.isdisjoint(one.lines[file])]
+                        useful.sort(key=lambda seed: (-best[seed], before[seed].seconds))
+                        by = noticed(file, text, within_budget(useful, before), checks, before)
                         best.update([by] if by else [])
                         said = "noticed" if by is not None else f"survived: {line}"
                         found["results"][fault] = said if useful else NOWHERE + line
@@ -149,7 +170,7 @@ def statement(source: str, line: int) -> set[int]:
     return found if within else set()
 
 
-def hopeless(meant: Interpreter) -> bool:
+def no_plan(meant: Interpreter) -> bool:
     """Return whether a world has no plan."""
     try:
         return meant.explored(meant.problem.domain.levels[-1], 2_000).least is None
@@ -157,35 +178,26 @@ def hopeless(meant: Interpreter) -> bool:
         return False
 
 
-def traced(
-    files: Sequence[str], worlds: Sequence[Drawn], mode: str, kept: Path
-) -> tuple[Saying, dict[str, dict[int, set[int]]]]:
-    """Judge worlds without a fault; return the complaints, and for each file the lines that each world executes.
+def within_budget(seeds: Sequence[int], before: Mapping[int, Traced]) -> list[int]:
+    """Return the first seeds whose worlds together take at most `BUDGET` CPU seconds without a fault, at least one."""
+    used = accumulate(before[seed].seconds for seed in seeds)
+    return list(seeds[: max(1, sum(one <= BUDGET for one in used))])
 
-    The results are kept in a file for a later run.
-    """
+
+def traced(files: Sequence[str], checks: Mapping[int, Check], kept: Path) -> dict[int, Traced]:
+    """Judge worlds without a fault, and return the results; the results are kept in a file for a later run."""
 
     def run(tell: Callable[[object], None]) -> None:
-        executed: dict[str, set[int]] = {Instead(file, "").name: set() for file in files}
-
-        def call(frame: FrameType, event: str, given: object) -> Any:
-            lines = executed.get(frame.f_globals.get("__name__", ""))
-            if lines is None:
-                return None
-
-            def line(frame: FrameType, event: str, given: object) -> Any:
-                lines.add(frame.f_lineno)
-                return line
-
-            return line(frame, event, given)
-
-        for world, meant in worlds:
+        executed = {file: set[int]() for file in files}
+        for file in files:
+            vars(import_module(Instead(file, "").name))[NOTED] = executed[file]
+            put(file, noting((ROOT / file).read_text("utf-8")))
+        for seed, one in checks.items():
             for lines in executed.values():
                 lines.clear()
-            sys.settrace(call)
-            said = judged(world, meant, mode)
-            sys.settrace(None)
-            tell([world.seed, said, [sorted(lines) for lines in executed.values()]])
+            begin = process_time()
+            said = one()
+            tell([seed, said, process_time() - begin, {file: sorted(lines) for file, lines in executed.items()}])
 
     answers: list[Any] = json.loads(kept.read_text("utf-8")) if kept.is_file() else []
     if not answers:
@@ -193,25 +205,59 @@ def traced(
         if not ended:
             raise SystemExit(f"{', '.join(files)}: the worlds can't be judged without any fault")
         kept.write_text(json.dumps(answers), "utf-8")
-    before = {str(seed): said for seed, said, _ in answers}
-    return before, {file: {seed: set(lines[i]) for seed, _, lines in answers} for i, file in enumerate(files)}
+    return {seed: Traced(*others) for seed, *others in answers}
 
 
-def noticed(file: str, text: str, worlds: dict[int, Drawn], mode: str, before: Saying) -> int | None:
-    """Return the seed of the first world that causes a new complaint if a module has a changed text; 0 if the process fails."""
+def noting(source: str) -> str:
+    """Return a module's text in which each statement of a function first notes its line in a set."""
+    tree = ast.parse(source)
+    inside = {id(node) for one in ast.walk(tree) if isinstance(one, ast.FunctionDef) for node in ast.walk(one)}
+    for node in list(ast.walk(tree)):
+        for name in ("body", "orelse", "finalbody"):
+            old = getattr(node, name, None)
+            if id(node) in inside and isinstance(old, list):
+                notes = (ast.parse(f"{NOTED}.add({one.lineno})").body[0] for one in old)
+                setattr(node, name, [each for pair in zip(notes, old, strict=True) for each in pair])
+    return ast.unparse(tree)
+
+
+def noticed(
+    file: str, text: str, seeds: Sequence[int], checks: Mapping[int, Check], before: Mapping[int, Traced]
+) -> int | None:
+    """Return the seed of the first world with a new complaint with a changed text of a module; 0 if the process fails."""
 
     def run(tell: Callable[[object], None]) -> None:
-        faulty = Instead(file, text)
-        sys.meta_path.insert(0, faulty)
-        for seed, (world, meant) in worlds.items():
-            if not set(judged(world, meant, mode)) <= set(before[str(seed)]):
+        put(file, text)
+        for seed in seeds:
+            if not set(checks[seed]()) <= set(before[seed].said):
                 tell(seed)
                 return
-        if worlds and sys.modules[faulty.name].__loader__ is not faulty:
-            raise ImportError(faulty.name)  # the worlds were judged without the fault
 
     answers, ended = forked(run, SECONDS)
     return answers[0] if answers else None if ended else 0
+
+
+def put(file: str, text: str) -> None:
+    """Put the changed functions of a text into a module: all users of the functions get the changed code."""
+    import_module(Instead(file, "").name)
+    different = changes((ROOT / file).read_text("utf-8"), text)
+    for one in gc.get_objects():
+        if isinstance(one, FunctionType) and one.__code__ in different:
+            one.__code__ = different[one.__code__]
+
+
+def changes(source: str, text: str) -> dict[CodeType, CodeType]:
+    """Return the functions and methods that differ in two texts of a module, as code of both texts."""
+    return dict(_differing(*(compile(one, "", "exec", dont_inherit=True) for one in (source, text))))
+
+
+def _differing(old: CodeType, new: CodeType) -> Iterator[tuple[CodeType, CodeType]]:
+    pairs = zip(*([one for one in code.co_consts if isinstance(one, CodeType)] for code in (old, new)), strict=False)
+    for one, other in pairs:
+        if not one.co_flags & CO_OPTIMIZED:  # the body of a class
+            yield from _differing(one, other)
+        elif one != other:
+            yield one, other
 
 
 def forked(run: Callable[[Callable[[object], None]], None], seconds: int | None) -> tuple[list[Any], bool]:
@@ -241,17 +287,61 @@ def forked(run: Callable[[Callable[[object], None]], None], seconds: int | None)
     return said, os.WIFEXITED(state) and os.WEXITSTATUS(state) == 0
 
 
-def judged(world: RandomWorld, meant: Interpreter, mode: str) -> list[str]:
-    """Judge a world in one mode, and return its complaints."""
-    from worlds import judging
-
+def check(world: RandomWorld, meant: Interpreter, mode: str) -> Check:
+    """Return the check of a world in a mode; for a checker, its plans or certificates are made now."""
     judging.SECONDS = WAITING
+    if mode not in ("checker", "certificates"):
+        return lambda: judged(world, meant, mode)
+    with TemporaryDirectory() as folder:
+        judge = judging.Judge(world, Path(folder), only=mode, meant=meant)
+        judge.truth()
+        file = Path(folder, "world.ttl")
+        file.write_text(scene(world), "utf-8")
+        read = judge.call("load", lambda: load(file))
+        problem = None if read is None else judge.call("read", lambda: read.reading.problem)
+        if read is None or problem is None:
+            return list
+        outcome = judge.outcome(read, "guarded") if mode == "checker" else None
+    if mode == "checker":
+        plans = [outcome.plan] if outcome is not None and outcome.plan is not None else []
+
+        def check_plans() -> list[str]:
+            judge.found.complaints.clear()
+            judge.rng = Random(world.seed)
+            judge.call(mode, lambda: judge.states(problem, PLANS))
+            judge.call(mode, lambda: judge.checker(problem, plans, PLANS))
+            return [one.kind for one in judge.found.complaints]
+
+        return check_plans
+    certificates = list(certificates_of(problem, judge, Random(world.seed)))
+    return lambda: [
+        f"{number} {what}"
+        for number, (what, one, right) in enumerate(certificates)
+        if accepted(problem, what, one) is not right
+    ]
+
+
+def judged(world: RandomWorld, meant: Interpreter, mode: str) -> list[str]:
+    """Judge a world in a mode of planning, and return the complaints."""
     with TemporaryDirectory() as folder:
         its = judging.Judge(world, Path(folder), only=mode, meant=meant).judged()
-    kept: Iterable[judging.Complaint] = (
-        one for one in (*its.complaints, *its.remarks) if one.kind != "gave-up" or hopeless(meant)
-    )
+    hopeless = no_plan(meant)
+    kept = (one for one in (*its.complaints, *its.remarks) if one.kind != "gave-up" or hopeless)
     return sorted({f"{one.kind} {one.mode}" for one in kept})
+
+
+def certificates_of(problem: Problem, judge: judging.Judge, rng: Random) -> Iterator[tuple[str, Certificate, bool]]:
+    """Yield certificates of a task, each with a description and whether the certificate is right."""
+    if judge.found.least is not None and judge.surely is not None:
+        lesser = judging.of_lesser_tasks(problem, rng)
+        others = of_a_task_with_a_plan(problem, judge.meant, judge.reached, rng)
+        yield from ((what, one, False) for what, one in (*lesser, *others))
+        return
+    for kind in ("all", *KINDS):
+        if (one := judging.certificate(kind, problem)) is not None:
+            yield f"by {kind}", one, True
+            if one.cases <= judging.FEW_CASES:
+                yield from ((what, false, False) for what, false in corrupted(problem, one, rng))
 
 
 if __name__ == "__main__":

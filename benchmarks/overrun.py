@@ -7,9 +7,8 @@
 Each call is tried with the longest limit in several scenes, until a call reaches the limit. The other limits are tried in this
 scene. If a call ends before its limit, the cell of the table is "before".
 
-Limits are in seconds of the wall clock. Another process reads the CPU time of a call and its child processes at the
-limit and at the end of the call. The difference of both CPU times is the overrun. The overrun is measured in CPU time,
-which depends little on the load of the machine.
+The clock of a call stands still while the call waits for a processor, so that the load of the machine hardly affects the
+results. The time of child processes counts as long as the call waits for them.
 """
 
 from __future__ import annotations
@@ -19,7 +18,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Collection, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -104,7 +102,21 @@ CALLS: tuple[tuple[str, str], ...] = (
 )
 """Calls in Python, each with its scene or group of scenes. `within` stands for a block of `confab.within(S)`."""
 BEGUN = """
-import os, sys
+import os, sys, threading, time
+here, real, seen = os.open("/proc/self/schedstat", os.O_RDONLY), time.perf_counter, [0.0, 0.0]
+def clock():
+    now = real()
+    if now - seen[0] > 0.001:
+        seen[:] = now, int(os.pread(here, 99, 0).split()[1]) / 1e9
+    return now - seen[1]
+time.perf_counter = clock
+class Timer(threading.Timer):
+    def run(self):
+        end = clock() + self.interval
+        while not self.finished.wait(0.01):
+            if clock() >= end:
+                return self.function(*self.args, **self.kwargs)
+threading.Timer = Timer
 from confab.reasoner.limits import Deadline
 begin = Deadline.after.__func__
 def after(cls, seconds):
@@ -113,7 +125,7 @@ def after(cls, seconds):
     return begin(cls, seconds)
 Deadline.after = classmethod(after)
 """
-"""Code that reports the begin of the time limit to the watching process."""
+"""Code that lets the clock stand still while the process waits for a processor, and reports the begin of the time limit."""
 COMMAND = "from confab.start import main; main()"
 CALL = """
 import confab
@@ -139,24 +151,19 @@ os._exit(3 if ended and ended.status.value == 'gave-up' else 0)
 
 @dataclass(frozen=True)
 class Ended:
-    """The end of a process.
-
-    `took` is the wall time in seconds since the begin of the limit. `after` is the CPU time in seconds after the limit,
-    or None if the process ended before the limit.
-    """
+    """The end of a process: its exit code, and the seconds since the begin of its limit in which it didn't wait for a processor."""
 
     code: int
     took: float
-    after: float | None
 
-    @property
-    def measured(self) -> bool:
-        """Whether the process reached its limit, or ended early because of the limit."""
-        return self.after is not None or self.code == 3
+    def measured(self, seconds: float) -> bool:
+        """Return whether the process reached its limit, or ended early because of the limit."""
+        return self.took > seconds or self.code == 3
 
     def share(self, seconds: float) -> str:
-        """Return the CPU time after the limit as a share of the limit, and the exit code, as text."""
-        return f"{(self.after or 0.0) / seconds:.0%} ({self.code})" if self.measured else f"before ({self.code})"
+        """Return the time after the limit as a share of the limit, and the exit code, as text."""
+        over = max(0.0, self.took / seconds - 1)
+        return f"{over:.0%} ({self.code})" if self.measured(seconds) else f"before ({self.code})"
 
 
 def overrun(code: str, arguments: Sequence[str], seconds: float) -> Ended:
@@ -171,28 +178,16 @@ def overrun(code: str, arguments: Sequence[str], seconds: float) -> Ended:
     ) as process:
         os.close(tell)
         os.read(told, 1)
-        began = perf_counter()
-        with suppress(subprocess.TimeoutExpired):
-            process.wait(seconds)
-            os.close(told)
-            return Ended(process.returncode, perf_counter() - began, None)
-        used = cpu_seconds(process.pid)
-        _, state, resources = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(state)
+        began, waited, late = perf_counter(), waiting(process.pid), waiting(os.getpid())
+        os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
+        took = perf_counter() - began - (waiting(process.pid) - waited) - (waiting(os.getpid()) - late)
         os.close(told)
-    after = resources.ru_utime + resources.ru_stime - used
-    return Ended(process.returncode, perf_counter() - began, max(0.0, after))
+        return Ended(process.wait(), took)
 
 
-def cpu_seconds(process: int) -> float:
-    """Return the CPU seconds of a process and its child processes."""
-    folder = Path("/proc") / str(process)
-    try:
-        own = int((folder / "schedstat").read_text().split()[0]) / 1e9
-        children = (folder / "task" / str(process) / "children").read_text().split()
-    except OSError:  # the process has ended
-        return 0.0
-    return own + sum(map(cpu_seconds, map(int, children)))
+def waiting(process: int) -> float:
+    """Return the seconds in which a process, perhaps an ended one, has waited for a processor."""
+    return int((Path("/proc") / str(process) / "schedstat").read_text().split()[1]) / 1e9
 
 
 def confab(*arguments: str) -> float:
@@ -243,9 +238,9 @@ def main(limits: Sequence[float], chosen: Collection[int], files: Sequence[str])
             ended: dict[tuple[str, float], Ended] = {}
             for name in groups.get(where, [where])[:TRIED]:
                 ended[name, max(limits)] = tried(said, words, name, max(limits))
-                if ended[name, max(limits)].measured:
+                if ended[name, max(limits)].measured(max(limits)):
                     break
-            scene = max(ended, key=lambda one: (ended[one].measured, ended[one].took))[0]
+            scene = max(ended, key=lambda one: (ended[one].measured(one[1]), ended[one].took))[0]
             for seconds in limits:
                 if (scene, seconds) not in ended:
                     ended[scene, seconds] = tried(said, words, scene, seconds)

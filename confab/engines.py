@@ -94,8 +94,12 @@ def _planned(problem: Problem, engine: str | None, level: int | None, deadline: 
     if level not in problem.domain.levels:
         raise KnowledgeError(f"no level {level}; this scene has {', '.join(map(str, problem.domain.levels))}")
     wanted = replace(problem, goal={**at_rest(problem, level), **problem.goal})
-    exported = to_pddl(wanted, level)
-    if deadline.left is not None and deadline.left < IMPORTING:
+
+    def late() -> bool:
+        return deadline.left is not None and deadline.left < IMPORTING
+
+    exported = None if late() else to_pddl(wanted, level)
+    if exported is None or late():
         return Outcome(Status.GAVE_UP, None, Reason("timeout"), seconds=perf_counter() - began)
     name, said, lines = answer(exported.domain, exported.problem, engine, deadline)
 

@@ -14,6 +14,8 @@ from inspect import getattr_static, signature
 from types import FunctionType
 from typing import TYPE_CHECKING, NoReturn, ParamSpec, TypeVar
 
+from confab.reasoner.limits import Deadline, within
+
 C = TypeVar("C", bound=type)
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -243,6 +245,8 @@ def brief(cls: C) -> C:
 def right_arguments(function: Callable[P, R], bound: int = 0) -> Callable[P, R]:
     """Return a function whose error for an unknown argument suggests an argument, or lists the arguments.
 
+    The argument ``time_limit`` limits the time of the whole call, including its imports and checks.
+
     Parameters
     ----------
     function : callable
@@ -276,7 +280,15 @@ def right_arguments(function: Callable[P, R], bound: int = 0) -> Callable[P, R]:
             )
         return function(*given, **named)
 
-    return checked
+    @wraps(function)
+    def limited(*given: P.args, **named: P.kwargs) -> R:
+        limit = named.get("time_limit")
+        if isinstance(limit, Deadline) or (isinstance(limit, int | float) and limit > 0):
+            with within(limit):
+                return checked(*given, **named)
+        return checked(*given, **named)
+
+    return limited if further or "time_limit" in own else checked
 
 
 def _keys(unpacked: str, module: str) -> Iterable[str]:

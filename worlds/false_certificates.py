@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import re
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from random import Random
 
+from confab.planner.certificate_checks import refusal
 from confab.planner.certificates import Certificate
-from confab.reasoner.symbols import Fact, Problem, Symbol
+from confab.reasoner.amounts import written
+from confab.reasoner.symbols import FALSE, TRUE, Fact, Problem, Symbol
 from worlds.interpreter import Interpreter, State, TooManyStatesError
 
 MOST_STATES = 600
 """Maximum number of states of a world in which certificates with a missing claim are refuted by search."""
 SAMPLE = 20
 """Number of reachable states that are changed to refute a certificate."""
+SHARES = (0.0, 0.3, 0.6, 1.0)
+"""Shares of the symbols whose values a random certificate tells apart."""
+COUNTED = re.compile(r"(\d+) cases can be reached")
+"""The message of the checker for a wrong number of cases."""
 NOTHING = "nothing"
 """A name that occurs in no world."""
+OTHERS = ("!", NOTHING)
+"""Names that occur in no world, and that are in sorted order before and after those of worlds."""
 
 
 def corrupted(problem: Problem, certificate: Certificate, rng: Random) -> Iterator[tuple[str, Certificate]]:
@@ -32,7 +41,8 @@ def corrupted(problem: Problem, certificate: Certificate, rng: Random) -> Iterat
         yield "with a fact of the initial state as never true", replace(certificate, never=certificate.never | {true})
     if certificate.always:
         one = rng.choice(sorted(certificate.always))
-        yield "with another constant", replace(certificate, always={**certificate.always, one: NOTHING})
+        for name in OTHERS:
+            yield "with another constant", replace(certificate, always={**certificate.always, one: name})
     meant = Interpreter(problem)
     for fact in rng.sample(sorted(certificate.never), min(3, len(certificate.never))):
         less = replace(certificate, never=certificate.never - {fact})
@@ -47,6 +57,42 @@ def corrupted(problem: Problem, certificate: Certificate, rng: Random) -> Iterat
             if disproved(meant, less, symbol, given(problem, symbol.situation)):
                 yield f"without a symbol of {name}", less
                 break
+
+
+def of_a_task_with_a_plan(
+    problem: Problem, meant: Interpreter, reached: Sequence[State], rng: Random
+) -> Iterator[tuple[str, Certificate]]:
+    """Yield random certificates of a task that has a plan; all claims except those about the goal hold in all reachable states."""
+    symbols = [symbol for symbol, slot in meant.slots.items() if slot < meant.stated]
+    rests = {s: kind.rest for s in symbols if (kind := meant.kinds[s.situation]).rest and s not in problem.goal}
+    final = sorted(Fact(symbol, value) for symbol, value in {**rests, **problem.goal}.items())
+    for share in SHARES:
+        apart = {symbol: () for symbol in symbols if rng.random() < share}
+        always, never = dict[Symbol, str](), set[Fact]()
+        for symbol in symbols:
+            values = {meant.value(state, symbol) for state in reached}
+            kind = meant.kinds[symbol.situation]
+            if symbol in apart or None in values:
+                continue
+            if len(values) == 1 and rng.random() < 0.8:
+                (value,) = values
+                always[symbol] = str(value) if kind.quantity is None else written(value)
+            elif kind.quantity is None:
+                others = (FALSE, TRUE) if kind.boolean else problem.members(kind.range)
+                never.update(Fact(symbol, value) for value in others if value not in values)
+        unmet = tuple(rng.sample(final, rng.randint(1, len(final))))
+        yield f"at random, {share:.0%} told apart", Certificate(frozenset(never), always, apart, 1, unmet)
+
+
+def accepted(problem: Problem, what: str, certificate: Certificate) -> bool:
+    """Return whether the checker accepts a certificate with a description.
+
+    Unless the number of cases is what is wrong, the certificate gets the number that the checker counts.
+    """
+    said = refusal(problem, certificate)
+    if said is not None and "case" not in what and (counted := COUNTED.match(said)):
+        said = refusal(problem, replace(certificate, cases=int(counted[1])))
+    return said is None
 
 
 def given(problem: Problem, situation: str) -> list[str]:

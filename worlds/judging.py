@@ -25,14 +25,16 @@ from confab.plan_options import NO_ENGINE
 from confab.planner.acting.episode import End
 from confab.planner.certificates import Certificate
 from confab.planner.plan import Outcome, Plan, Status
-from confab.planner.validation import validate
+from confab.planner.validation import Facts, successor, validate
 from confab.planning import plan
+from confab.reasoner.amounts import written
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.language import DomainError
 from confab.reasoner.limits import LimitError
-from confab.reasoner.symbols import Problem, Symbol
+from confab.reasoner.symbols import FALSE, Problem, Symbol
 from confab.scene import Scene, load
 from worlds.corrupted import corrupted, numbered, random_steps
+from worlds.false_certificates import accepted, of_a_task_with_a_plan
 from worlds.false_certificates import corrupted as corrupted_certificates
 from worlds.interpreter import Interpreter, State, TooManyStatesError
 from worlds.mixed import RandomWorld
@@ -49,6 +51,8 @@ LEFT_OUT, CERTIFYING = 3, 100_000
 """Number of behaviours that are left out in turn for false certificates, and maximum work for each certificate."""
 MOST_ACTIONS = 1_500
 """Maximum number of grounded behaviours of an imported problem for the exhaustive search."""
+STATES = 3
+"""Number of reachable states, and of behaviours in each state, in which the plan checker is compared with the interpreter."""
 FEW_CASES = 30
 """Maximum number of cases of a certificate that is corrupted, so that its checks take little time."""
 T = TypeVar("T")
@@ -95,6 +99,30 @@ def limited(seconds: float) -> Iterator[None]:
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0)
         signal.signal(signal.SIGPROF, before)
+
+
+def certificate(kind: str, problem: Problem) -> Certificate | None:
+    """Return a certificate of a kind, or of any kind for ``all``; None if none is found."""
+    from confab.planner.certifying import certify, of_kind
+
+    return certify(problem, CERTIFYING) if kind == "all" else of_kind(kind, problem, CERTIFYING)
+
+
+def of_lesser_tasks(problem: Problem, rng: Random) -> Iterator[tuple[str, Certificate]]:
+    """Yield certificates of tasks that lack one behaviour of the lowest level, each with a description."""
+    lowest = [behavior.name for behavior in problem.domain.at_level(problem.domain.levels[-1])]
+    for name in rng.sample(lowest, min(len(lowest), LEFT_OUT)):
+        others = {other: behavior for other, behavior in problem.domain.behaviors.items() if other != name}
+        domain = replace(problem.domain, behaviors=others)
+        if problem.domain.levels[-1] not in domain.levels:
+            continue  # another level would be the lowest
+        if (found := certificate("all", replace(problem, domain=domain))) is not None:
+            yield f"without {name}", found
+
+
+def _text(value: Any) -> str:
+    """Return a value of the interpreter as the text of a fact."""
+    return value if isinstance(value, str) else written(value)
 
 
 class Judge:
@@ -212,8 +240,9 @@ class Judge:
         if refused:
             return
         if not self.only or self.only == "checker":
+            self.call("checker", lambda: self.states(read.reading.problem))
             plans = [outcome.plan for outcome in results.values() if outcome is not None and outcome.plan is not None]
-            self.call("checker", lambda: self.checker(read, plans))
+            self.call("checker", lambda: self.checker(read.reading.problem, plans))
         if self.sampled(CERTIFICATES, "certificates", "certificates"):
             self.call("certificates", lambda: self.false_certificates(read))
         if self.sampled(CERTIFICATES, "proofs", "certificates", "proofs"):
@@ -285,11 +314,10 @@ class Judge:
                 self.complain("a false certificate", mode, f"{symbol} isn't always {value}")
                 return
 
-    def checker(self, read: Scene, plans: Sequence[Plan]) -> None:
-        """Compare the plan checker with the interpreter on mostly invalid plans."""
-        problem = read.reading.problem
-        drawn = [corrupted(plan, problem, self.rng) for plan in plans for _ in range(2)]
-        for steps in [*drawn, random_steps(self.meant, self.rng)]:
+    def checker(self, problem: Problem, plans: Sequence[Plan], many: int = 2) -> None:
+        """Compare the plan checker with the interpreter on plans, `many` changed copies of each plan, and random steps."""
+        drawn = [corrupted(plan, problem, self.rng) for plan in plans for _ in range(many)]
+        for steps in [*plans, *drawn, random_steps(self.meant, self.rng)]:
             if max((step.level for step in steps.walk()), default=0) != problem.domain.levels[-1]:
                 continue  # the checker also accepts plans of upper levels only, which other planners return
             said, meant = validate(problem, numbered(steps, problem)), faults(self.meant, steps)
@@ -299,6 +327,36 @@ class Judge:
                 self.complain(what, "checker", f"{meant[:1]} {[one.text for one in said[:1]]}: {text}")
                 return
 
+    def states(self, problem: Problem, many: int = STATES) -> None:
+        """Compare derived values and successors by the plan checker with those by the interpreter in some reachable states.
+
+        The values of a state are read in random order, since the checker keeps values that it has derived.
+        """
+        meant, level = self.meant, problem.domain.levels[-1]
+        derived = [symbol for symbol, slot in meant.slots.items() if slot >= meant.stated]
+        derived = [one for one in derived if one.situation in problem.domain.rules and one.situation in meant.kinds]
+        actions = meant.actions(level)
+        for state in self.rng.sample(self.reached, min(len(self.reached), many)):
+            values = {symbol: _text(state[slot]) for symbol, slot in meant.slots.items() if slot < meant.stated}
+            before = {**problem.initial, **values}
+            stated = [symbol for symbol in values if symbol.situation not in problem.domain.remembers]
+            facts = Facts(problem, before)
+            for symbol in self.rng.sample(derived, len(derived)):
+                said = facts.value(symbol.situation, symbol.arguments) or FALSE
+                if said != meant.value(state, symbol):
+                    self.complain("the checker derives another value", "checker", f"{symbol} is {said} in {before}")
+                    return
+            for action in self.rng.sample(actions, min(len(actions), many)):
+                name, arguments = action.behavior.name, action.arguments
+                after = successor(problem, problem.domain.behaviors[name], arguments, before)
+                got = None if after is None else [after.get(symbol, FALSE) for symbol in stated]
+                wanted = [
+                    [_text(made[meant.slots[s]]) for s in stated] for _, made in meant.done(name, arguments, state)
+                ]
+                if wanted and got not in wanted:  # the successor has no bounds of sums, which the interpreter respects
+                    self.complain("the checker has another successor", "checker", f"{name} {arguments} in {before}")
+                    return
+
     def proofs(self, read: Scene) -> None:
         """Certify the task without a search, and judge the certificates without the planner.
 
@@ -307,11 +365,11 @@ class Judge:
         each task without a plan. The checker must reject certificates that have lost a claim or have a false one.
         """
         from confab.planner.certificate_checks import refusal
-        from confab.planner.certifying import KINDS, certify, of_kind
+        from confab.planner.certifying import KINDS
 
         def judged(kind: str) -> None:
             problem, found, mode = read.reading.problem, self.found, f"proofs by {kind}"
-            one = certify(problem, CERTIFYING) if kind == "all" else of_kind(kind, problem, CERTIFYING)
+            one = certificate(kind, problem)
             if one is None:
                 if found.known and found.least is None and kind in ("all", "cases", "states"):
                     found.remarks.append(Complaint("no certificate", mode, ""))
@@ -323,7 +381,7 @@ class Judge:
             self.claims(mode, one)
             if one.cases <= FEW_CASES:
                 for what, false in corrupted_certificates(problem, one, self.rng):
-                    if refusal(problem, false) is None:
+                    if accepted(problem, what, false):
                         self.complain("a false certificate is accepted", mode, f"{what}: {false}")
 
         for kind in ("all", *KINDS):
@@ -334,21 +392,15 @@ class Judge:
 
         If the complete task has a plan, the checker must reject these certificates.
         """
-        from confab.planner.certificate_checks import refusal
-        from confab.planner.certifying import certify
-
         if self.found.least is None or self.surely is None:
             return
         problem = read.reading.problem
-        lowest = [behavior.name for behavior in problem.domain.at_level(problem.domain.levels[-1])]
-        for name in self.rng.sample(lowest, min(len(lowest), LEFT_OUT)):
-            others = {other: behavior for other, behavior in problem.domain.behaviors.items() if other != name}
-            domain = replace(problem.domain, behaviors=others)
-            if problem.domain.levels[-1] not in domain.levels:
-                continue  # another level would be the lowest
-            found = certify(replace(problem, domain=domain), CERTIFYING)
-            if found is not None and refusal(problem, found) is None:
-                self.complain("a false certificate is accepted", "certificates", f"without {name}: {found}")
+        for what, found in (
+            *of_lesser_tasks(problem, self.rng),
+            *of_a_task_with_a_plan(problem, self.meant, self.reached, self.rng),
+        ):
+            if accepted(problem, what, found):
+                self.complain("a false certificate is accepted", "certificates", f"{what}: {found}")
 
     def with_a_lesson(self, read: Scene, first: Plan) -> None:
         """Plan again with a memory that has learned one plan."""

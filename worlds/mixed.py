@@ -80,26 +80,29 @@ class RandomWorld:
     updates: frozenset[str] = frozenset()
 
 
-def mixed(seed: int, aggregated: float = AGGREGATED, constrained: float = 0.0, remembered: float = 0.0) -> RandomWorld:
+def mixed(
+    seed: int, aggregated: float = AGGREGATED, constrained: float = 0.0, remembered: float = 0.0, mutual: float = 0.0
+) -> RandomWorld:
     """Return the random world of a seed; for the other parameters see `drawn`."""
-    return drawn(seed, aggregated, constrained, remembered)[0]
+    return drawn(seed, aggregated, constrained, remembered, mutual)[0]
 
 
 def drawn(
-    seed: int, aggregated: float = AGGREGATED, constrained: float = 0.0, remembered: float = 0.0
+    seed: int, aggregated: float = AGGREGATED, constrained: float = 0.0, remembered: float = 0.0, mutual: float = 0.0
 ) -> tuple[RandomWorld, Interpreter]:
     """Return the random world of a seed, and an interpreter of the world.
 
     Parameters
     ----------
     seed : int
-    aggregated, constrained, remembered : float
-        The shares of worlds with derived amounts, with constraints on every state, and with remembered situation types.
+    aggregated, constrained, remembered, mutual : float
+        The shares of worlds with derived amounts, with constraints on every state, with remembered situation types, and with two
+        situation types that define each other.
     """
     rng = Random(f"mixed {seed}")
     most, least = (MOST, FEW if rng.random() < 0.5 else 2) if rng.random() > UNBOUNDED else (MOST // 10, 0)
     while True:
-        world = _Draft(rng, seed, aggregated, constrained, remembered).world()
+        world = _Draft(rng, seed, aggregated, constrained, remembered, mutual).world()
         interpreter = Interpreter(world.problem)
         try:
             costs = interpreter.explored(world.problem.domain.levels[-1], most, False).costs
@@ -239,9 +242,12 @@ def _recursive(aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]]) -> boo
 class _Draft(Vocabulary):
     """A randomly drawn world without its goal."""
 
-    def __init__(self, rng: Random, seed: int, aggregated: float, constrained: float, remembered: float) -> None:
+    def __init__(
+        self, rng: Random, seed: int, aggregated: float, constrained: float, remembered: float, mutual: float
+    ) -> None:
         super().__init__(rng)
-        self.seed, self.share, self.prevented, self.remembered = seed, aggregated, constrained, remembered
+        self.seed, self.share, self.prevented = seed, aggregated, constrained
+        self.remembered, self.connected = remembered, mutual
         self.forbidden: list[str] = []  # situation types of which a constraint is drawn
         self.levels = rng.choice((1, 1, 1, 2, 2, 3))
         self.owners: dict[str, tuple[str, ...]] = {}
@@ -267,6 +273,7 @@ class _Draft(Vocabulary):
             self.defined(number)
         for number in range(0 if first else many):
             self.aggregated(number)
+        self.mutual()
         self.remembering()
         behaviors = self.behaviors()
         used = {b.level for b in behaviors}
@@ -417,6 +424,40 @@ class _Draft(Vocabulary):
         level = max((self.situations[s].level for rule in rules for s in named(rule.conditions)), default=1)
         self.situations[name] = SituationType(name, arguments, "Truth", level, boolean=True, default=FALSE)
         self.rules[name] = tuple(rules)
+
+    def mutual(self) -> None:
+        """Draw two situation types that define each other: objects that links connect, in any direction, with certain objects."""
+        own, rng = Random(f"mutual {self.seed}"), self.rng
+        links: list[tuple[tuple[str, ...], Condition]] = [
+            (one.arguments, ValueCondition(one.name, ("?x", "?y"), TRUE))
+            for one in self.situations.values()
+            if one.boolean and one.name not in self.rules and one.arguments[1:] in (("A",), ("A1",), ("B",))
+        ]
+        if "near" in self.ends:
+            links.append((self.ends["near"], RelationCondition("near", ("?x", "?y"))))
+        if own.random() >= self.connected or not links:
+            return
+        self.rng = own  # a separate generator keeps worlds without such situation types unchanged
+        kinds, link = own.choice(links)
+        writer = Phrases(self, HIGHEST)
+        one = writer.fresh(kinds[0])
+        first = writer.conditions([one], 1, 1)
+        x, y = (Parameter(term, kind) for term, kind in zip(("?x", "?y"), kinds, strict=True))
+        terms = writer.terms()
+        rules = {
+            "D8": (
+                Rule("D8", terms[:1], terms[1:], tuple(first)),
+                Rule("D8", (x,), (), (Witness("?y", kinds[1], (link, ValueCondition("D9", ("?y",), TRUE))),)),
+            ),
+            "D9": (Rule("D9", (y,), (), (Witness("?x", kinds[0], (link, ValueCondition("D8", ("?x",), TRUE))),)),),
+        }
+        used = named([*first, link]) & self.situations.keys()
+        level = max((self.situations[name].level for name in used), default=1)
+        for name, kind in zip(rules, kinds, strict=True):
+            self.owners[name] = (kind,)
+            self.situations[name] = SituationType(name, (kind,), "Truth", level, boolean=True, default=FALSE)
+        self.rules.update(rules)
+        self.rng = rng
 
     def aggregated(self, number: int) -> None:
         """Draw a sum, a count, a maximum or a minimum over individuals."""

@@ -16,6 +16,7 @@ from confab.execution import Execution
 from confab.planner.plan import Status
 from confab.planning import Result
 from confab.reasoner.generate import write_scene
+from confab.reasoner.graph.query_process import QueryLimits
 from confab.reasoner.limits import LimitError, OutOfTimeError, current
 from confab.scene import Scene
 from confab.terminal import GAVE_UP
@@ -119,6 +120,30 @@ def test_a_simulation_ends_by_its_time_limit() -> None:
     with pytest.raises(OutOfTimeError, match="while simulating"):
         scene.verify(result, 50, time_limit=1.0)
     assert process_time() - begin < 4.0
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda _, result: result.scene.plan(time_limit=60.0),
+        lambda _, result: result.scene.execute(time_limit=60.0),
+        lambda _, result: result.verify(time_limit=60.0),
+        lambda limits, result: result.scene.query("ASK {}", limits=limits),
+    ],
+)
+def test_the_limit_of_a_call_includes_its_first_checks(
+    call: Callable[[QueryLimits, Result], object], solved: Result, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    held: list[float] = []
+
+    def first(_: object) -> None:
+        held.append(current().seconds)
+        raise InterruptedError
+
+    monkeypatch.setattr(Scene, "settle", first)
+    with pytest.raises(InterruptedError):
+        call(QueryLimits(seconds=60.0), solved)
+    assert held == [60.0]
 
 
 def test_explaining_a_plan_is_within_the_limit_of_planning_it(monkeypatch: pytest.MonkeyPatch) -> None:
