@@ -29,7 +29,7 @@ from confab.planner.plan_costs import cost_of, costs_of_steps
 from confab.planner.transitions import Cell, arguments_of, key_of
 from confab.planner.validation import validate
 from confab.reasoner.amounts import meets
-from confab.reasoner.limits import LimitError, within
+from confab.reasoner.limits import LimitError, check, within
 from confab.reasoner.symbols import FALSE, Problem, State, Symbol
 
 CLOSE = 1.1
@@ -186,6 +186,7 @@ def replan(
     if outcome.plan is None:
         with within(left.seconds):
             return None, certified(now, outcome)
+    check("planning")  # a plan that can't be begun in time needn't be checked
     steps = renumbered((*first, *outcome.plan.steps)) if first else outcome.plan.steps
     reason = rejected(now, steps)
     return (None, replace(outcome, status=Status.GAVE_UP, plan=None, reason=reason)) if reason else (steps, outcome)
