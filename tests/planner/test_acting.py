@@ -99,7 +99,7 @@ def test_after_step_28_the_cup_moves_and_the_right_hand_does_the_rest_as_in_figu
     assert at_rest(episode)
 
 
-def test_in_the_papers_mode_after_a_demonstration_the_whole_course_is_that_of_the_figures() -> None:
+def test_the_papers_mode_executes_the_steps_of_figures_7_and_8_after_a_demonstration() -> None:
     shown = Plan(tuple(sorted(planned().steps, key=lambda step: [22, 34, 28, 39].index(step.id))))
     links = learn(serving(), shown, Links())
     episode = acted(
@@ -113,12 +113,12 @@ def test_in_the_papers_mode_after_a_demonstration_the_whole_course_is_that_of_th
     assert episode.replans[0].after == (2, 1, 2)
 
 
-def test_replanning_from_scratch_comes_to_the_same() -> None:
+def test_replanning_from_scratch_gives_the_same_steps_as_repair() -> None:
     episode = acted(moved("cup2", "location8", after=28), wanted("cup2", "location8", after=28), repairs=False)
     assert tree(episode.done) == SERVED_AS_IN_FIGURE_8
 
 
-def test_what_was_done_is_a_plan_if_nobody_interferes() -> None:
+def test_the_executed_steps_equal_the_plan_without_interventions() -> None:
     episode = acted()
     assert episode.done == planned()
     assert episode.replans == ()
@@ -132,7 +132,7 @@ def begun(episode: Episode) -> list[str]:
     return [str(event.step) for event in episode.events]
 
 
-def test_an_object_that_vanished_is_not_poured_into() -> None:
+def test_the_robot_does_not_pour_into_a_removed_cup() -> None:
     episode = acted(Intervention(InterventionKind.REMOVE, individual="cup2", after=28))
     assert episode.status is End.IMPOSSIBLE
     assert any("cup2" in reason.terms for reason in episode.reasons)
@@ -155,7 +155,7 @@ def test_a_primitive_whose_precondition_is_lost_is_not_begun() -> None:
     assert episode.status is End.REACHED
 
 
-def test_what_is_interrupted_leaves_the_hand_in_a_named_state_from_which_planning_goes_on() -> None:
+def test_an_interrupted_primitive_leaves_the_hand_in_a_state_from_which_planning_continues() -> None:
     reach = planned().primitives[0]
     episode = acted(moved("cup1", "location8", at=0.5))
     first = episode.events[0]
@@ -164,7 +164,7 @@ def test_what_is_interrupted_leaves_the_hand_in_a_named_state_from_which_plannin
     assert at_rest(episode)
 
 
-def test_nobody_puts_down_where_somebody_else_has_put_something() -> None:
+def test_a_hand_does_not_put_an_object_down_at_a_place_that_a_person_has_occupied() -> None:
     over = next(i for i, s in enumerate(planned().primitives) if s.arguments[1:] == ("location5",))
     episode = acted(moved("bottle2", "location5", after=planned().primitives[over].path))
     assert episode.status is End.REACHED
@@ -186,7 +186,7 @@ def test_a_cup_filled_with_the_wrong_drink_is_proved_hopeless_and_the_rest_is_se
     assert holds(episode)
 
 
-def test_a_goal_that_is_dropped_is_not_served() -> None:
+def test_a_dropped_goal_is_not_achieved() -> None:
     drop = [
         Intervention(InterventionKind.DROP_GOAL, symbol=Symbol("BEVERAGE", (cup,)), after=28)
         for cup in ("cup1", "cup2")
@@ -196,14 +196,14 @@ def test_a_goal_that_is_dropped_is_not_served() -> None:
     assert len(episode.done.primitives) == 12
 
 
-def test_an_object_that_is_added_stands_in_the_way_and_is_taken_care_of() -> None:
+def test_an_added_object_at_a_goal_place_is_moved_away() -> None:
     newcomer = (at("cup9", "location5"), at("cup9", "no_beverage", "BEVERAGE"))
     episode = acted(Intervention(InterventionKind.ADD, newcomer, individual="cup9", kind="Cup", after=22))
     assert episode.status is End.REACHED
     assert episode.observed[Symbol("LOCATION", ("cup9",))] != "location5"
 
 
-def test_goals_about_what_was_added_are_served() -> None:
+def test_goals_about_added_objects_are_achieved() -> None:
     newcomer = (at("cup9", "location6"), at("cup9", "no_beverage", "BEVERAGE"))
     episode = acted(
         Intervention(InterventionKind.ADD, newcomer, individual="cup9", kind="Cup", after=22),
@@ -223,7 +223,7 @@ def failing(test: Callable[[Step, State], bool], code: str = "no path") -> Episo
     return act(serving(), SymbolicWorld(serving(), fault=fault), planned())
 
 
-def test_what_has_no_path_as_things_stand_is_done_when_they_stand_otherwise() -> None:
+def test_a_primitive_without_a_path_is_executed_after_the_obstacle_has_moved() -> None:
     there = at("cup2", "location1")
 
     def blocked(step: Step, state: State) -> Report | None:
@@ -242,7 +242,7 @@ def test_what_has_no_path_as_things_stand_is_done_when_they_stand_otherwise() ->
     assert {one.facts for one in episode.refuted} == {(there,)}
 
 
-def test_a_slip_is_tried_again() -> None:
+def test_a_primitive_that_failed_once_is_repeated() -> None:
     tries = iter([True])
     episode = failing(lambda step, state: step.behavior == "B3_GRASP" and next(tries, False), "no grasp")
     assert episode.status is End.REACHED
@@ -250,7 +250,7 @@ def test_a_slip_is_tried_again() -> None:
     assert episode.replans == ()
 
 
-def test_where_one_hand_has_no_path_the_other_hand_does_it() -> None:
+def test_the_other_hand_does_the_step_if_one_hand_has_no_path() -> None:
     bottle = Symbol("LOCATION", ("bottle2",))
     episode = failing(
         lambda step, state: (
@@ -262,14 +262,14 @@ def test_where_one_hand_has_no_path_the_other_hand_does_it() -> None:
     assert len(episode.failures) == 2
 
 
-def test_where_no_hand_has_a_path_it_gives_up_and_says_why() -> None:
+def test_an_episode_in_which_no_hand_has_a_path_gives_up_with_a_reason() -> None:
     episode = failing(lambda step, state: "cup2" in step.arguments and step.behavior == "B3_REACH_HAND_OBJECT")
     assert episode.status is End.GAVE_UP
     assert episode.reasons
     assert at_rest(episode)
 
 
-def test_a_world_in_which_nothing_works_is_given_up_soon() -> None:
+def test_an_episode_in_which_every_primitive_fails_is_given_up_soon() -> None:
     episode = failing(lambda step, state: True)
     assert episode.status is End.GAVE_UP
     assert len(episode.events) < 100
@@ -297,7 +297,7 @@ def blocked(step: Step, state: State) -> Report | None:
 
 
 @pytest.mark.parametrize("learning", [True, False])
-def test_the_second_attempt_in_the_same_situation_chooses_better_only_if_it_learned(learning: bool) -> None:
+def test_a_second_episode_avoids_the_failure_only_if_the_robot_has_learned_it(learning: bool) -> None:
     caution, ends = Caution(), []
     for _ in range(3):
         world = SymbolicWorld(serving(), fault=blocked)
@@ -307,13 +307,13 @@ def test_the_second_attempt_in_the_same_situation_chooses_better_only_if_it_lear
     assert ends == [End.GAVE_UP, *[End.REACHED if learning else End.GAVE_UP] * 2]
 
 
-def test_caution_never_gives_a_task_up_that_has_only_one_way() -> None:
+def test_a_task_with_one_possible_hand_is_not_given_up_because_of_past_failures() -> None:
     only = ("canReach", ("left_hand", "location1"))
     world = SymbolicWorld(serving())
     assert act(serving(), world, caution=Caution({only: (9, 9)})).status is End.REACHED
 
 
-def test_what_two_robots_have_seen_adds_up() -> None:
+def test_the_failure_counts_of_two_robots_are_added() -> None:
     one, other = ("canReach", ("left_hand", "location1")), ("canReach", ("left_hand", "location2"))
     assert (Caution({one: (3, 1)}) + Caution({one: (1, 1), other: (2, 0)})).counts == {one: (4, 2), other: (2, 0)}
 
@@ -346,7 +346,7 @@ def interventions(draw: st.DrawFn) -> Intervention:
 
 @settings(max_examples=40)
 @given(st.lists(interventions(), min_size=1, max_size=2))
-def test_whatever_people_do_the_goal_is_reached_or_proved_impossible(happenings: list[Intervention]) -> None:
+def test_the_goal_is_reached_or_proved_impossible_whatever_people_do(happenings: list[Intervention]) -> None:
     episode = acted(*happenings)
     assert episode.status in (End.REACHED, End.IMPOSSIBLE)
     assert (episode.status is End.IMPOSSIBLE) == bool(episode.reasons)
@@ -363,7 +363,7 @@ def test_the_same_course_of_events_gives_the_same_episode() -> None:
     assert timeless(acted(happening)) == timeless(acted(happening))
 
 
-def test_a_spectator_is_told_of_every_primitive_and_every_change() -> None:
+def test_an_observer_receives_every_primitive_and_every_change() -> None:
     events: list[Event] = []
     episode = acted(moved("cup2", "location8", after=28), wanted("cup2", "location8", after=28), observer=events.append)
     said = [event.what for event in events]
@@ -374,7 +374,9 @@ def test_a_spectator_is_told_of_every_primitive_and_every_change() -> None:
     assert said[-1] == "over"
 
 
-def test_twenty_objects_are_served_whatever_is_moved(tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_an_intervention_among_twenty_objects_changes_few_steps_of_the_plan(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
     path = tmp_path_factory.mktemp("scenes") / "served.ttl"
     write_scene(path, "served", 20)
     problem = read(load(path)).problem
@@ -389,7 +391,7 @@ def test_twenty_objects_are_served_whatever_is_moved(tmp_path_factory: pytest.Te
 # ------------------------------------------------------------------------------------------------------------- the world itself
 
 
-def test_what_never_came_is_kept() -> None:
+def test_interventions_whose_time_never_came_are_listed_as_missed() -> None:
     never = [moved("cup2", "location8", after=999), moved("cup2", "location8", at=1e6)]
     episode = acted(*never)
     assert episode.status is End.REACHED
@@ -397,7 +399,7 @@ def test_what_never_came_is_kept() -> None:
     assert episode.interventions == ()
 
 
-def test_a_primitive_that_failed_but_did_what_it_should_is_done() -> None:
+def test_a_primitive_that_reports_a_failure_but_has_its_effects_counts_as_done() -> None:
     class Grumbling(SymbolicWorld):
         def execute(self, step: Step) -> Report:
             said = super().execute(step)
@@ -409,7 +411,7 @@ def test_a_primitive_that_failed_but_did_what_it_should_is_done() -> None:
     assert [failure.code for failure in episode.failures] == ["object disturbed"] * 4
 
 
-def test_what_failed_everywhere_is_tried_anew_before_it_is_given_up() -> None:
+def test_primitives_that_failed_with_every_hand_are_retried_before_the_goal_is_given_up() -> None:
     tries = iter(range(4))  # each hand fails twice, then a person removes the obstacle
     episode = failing(
         lambda step, state: (
@@ -420,7 +422,7 @@ def test_what_failed_everywhere_is_tried_anew_before_it_is_given_up() -> None:
     assert len(episode.failures) == 4
 
 
-def test_only_what_failures_stand_against_is_given_up() -> None:
+def test_only_goals_that_failures_prevent_are_given_up() -> None:
     """No hand can ever grasp cup2: all other goals are achieved first, and the reason names the failure."""
     episode = failing(lambda step, state: "cup2" in step.arguments and step.behavior == "B3_REACH_HAND_OBJECT")
     assert episode.status is End.GAVE_UP
@@ -435,7 +437,7 @@ def test_only_what_failures_stand_against_is_given_up() -> None:
 # ------------------------------------------------------------------------------------------------------------- beyond the scene
 
 
-def test_what_is_pushed_off_its_place_is_at_a_spot_and_fetched_back() -> None:
+def test_an_object_that_is_pushed_off_its_place_is_at_a_spot_and_is_brought_back() -> None:
     push = Intervention(InterventionKind.PUSH, individual="cup2", numbers=(0.0, 0.08), after=28)  # cup2 is at its goal
     episode = acted(push)
     assert episode.status is End.REACHED
@@ -446,7 +448,7 @@ def test_what_is_pushed_off_its_place_is_at_a_spot_and_fetched_back() -> None:
     assert episode.observed[Symbol("LOCATION", ("cup2",))] == "location5"
 
 
-def test_a_box_that_nobody_spoke_of_is_put_aside() -> None:
+def test_an_unknown_box_at_a_goal_place_is_moved_away() -> None:
     fact = at("box1", "location5")
     episode = acted(
         Intervention(InterventionKind.BOX, (fact,), individual="box1", kind="Movable", numbers=(0.1,) * 3, after=22)
@@ -456,7 +458,7 @@ def test_a_box_that_nobody_spoke_of_is_put_aside() -> None:
 
 
 @pytest.mark.parametrize("knocked", ["cup2", "bottle1"])
-def test_what_lies_is_given_up_alone(knocked: str) -> None:
+def test_only_the_goals_of_a_knocked_over_object_are_given_up(knocked: str) -> None:
     episode = acted(Intervention(InterventionKind.KNOCK, individual=knocked, after=22))
     assert episode.status is End.IMPOSSIBLE
     assert any(knocked in reason.text for reason in episode.reasons)
@@ -498,7 +500,7 @@ def test_a_world_that_breaks_ends_the_episode_with_a_clear_reason(how: str, word
     assert len(episode.done.primitives) <= 4
 
 
-def test_everything_is_taken_away() -> None:
+def test_a_goal_is_impossible_after_the_removal_of_all_objects() -> None:
     episode = acted(*(Intervention(InterventionKind.REMOVE, individual=one, after=22) for one in OBJECTS))
     assert episode.status is End.IMPOSSIBLE
     assert at_rest(episode)

@@ -65,7 +65,7 @@ def pouring(there: str, cups: int, portion: Fraction, refill: str | None = "1") 
 
 
 @pytest.mark.parametrize("mode", ["guarded", "paper", "optimal"])
-def test_what_a_step_needs_of_an_amount_is_brought_about(mode: str) -> None:
+def test_an_amount_that_a_step_requires_is_achieved(mode: str) -> None:
     outcome = solve(Request(pouring("1.5", 3, Fraction(1)), mode))
     assert outcome.status is Status.SOLVED
     assert outcome.plan is not None
@@ -74,14 +74,14 @@ def test_what_a_step_needs_of_an_amount_is_brought_about(mode: str) -> None:
     assert primitives.count("FILL") == 2
 
 
-def test_thirds_are_thirds_and_tenths_are_tenths() -> None:
+def test_amounts_of_thirds_and_tenths_are_exact() -> None:
     for portion in (Fraction(1, 3), Fraction(1, 10)):
         problem = pouring(written(portion * 3), 3, portion, refill=None)
         assert solve(Request(problem)).status is Status.SOLVED  # the last portion takes exactly the remaining amount
         assert plan_level(problem, 2).status is Status.SOLVED
 
 
-def test_who_gives_up_says_which_amount_was_in_the_way() -> None:
+def test_the_reason_for_giving_up_names_the_missing_amount() -> None:
     outcome = solve(Request(pouring("0.5", 2, Fraction(1)), limits=Limits(expansions=3)))
     assert outcome.status is Status.GAVE_UP and outcome.reason is not None
     assert outcome.reason.text.endswith("; TEA of jug: 0.5 servings there, >=1 wanted")
@@ -103,7 +103,9 @@ def test_who_gives_up_says_which_amount_was_in_the_way() -> None:
         ),
     ],
 )
-def test_unsolvable_says_by_how_much(there: str, cups: int, portion: str, wanted: dict[str, str], said: str) -> None:
+def test_the_reason_for_unsolvable_states_the_missing_amount(
+    there: str, cups: int, portion: str, wanted: dict[str, str], said: str
+) -> None:
     problem = pouring(there, cups, Fraction(portion), refill=None)
     problem = replace(problem, goal={**problem.goal, **{Symbol("TEA", (j,)): v for j, v in wanted.items()}})
     outcome = solve(Request(problem))
@@ -112,7 +114,7 @@ def test_unsolvable_says_by_how_much(there: str, cups: int, portion: str, wanted
     assert outcome.reason.text == said
 
 
-def test_what_gives_an_amount_back_by_undoing_what_took_it_gives_no_more() -> None:
+def test_a_behaviour_that_only_returns_a_consumed_amount_provides_no_additional_amount() -> None:
     problem = pouring("2", 3, Fraction(1), refill=None)
 
     def given_back(much: str) -> Outcome:
@@ -128,7 +130,7 @@ def test_what_gives_an_amount_back_by_undoing_what_took_it_gives_no_more() -> No
     assert given_back("1.5").status is Status.SOLVED
 
 
-def test_what_each_step_leaves_counts_as_missing_too() -> None:
+def test_an_amount_that_a_step_requires_but_does_not_consume_counts_as_missing_too() -> None:
     problem = confab.load("three-cups").problem
     assert solve(Request(problem)).status is Status.SOLVED
     less = {**problem.initial, Symbol("SERVINGS", ("bottle1",)): "3"}  # a pour requires two of these
@@ -140,7 +142,7 @@ def test_what_each_step_leaves_counts_as_missing_too() -> None:
     )
 
 
-def test_a_goal_has_bounds_and_other_goals_dont_break_it() -> None:
+def test_a_goal_with_bounds_is_kept_while_other_goals_are_achieved() -> None:
     problem = pouring("1", 2, Fraction(1))
     problem = replace(problem, goal={**problem.goal, Symbol("TEA", ("jug",)): bounds_written(">=2,<3")})
     outcome = solve(Request(problem, leave_levels=False))
@@ -148,7 +150,7 @@ def test_a_goal_has_bounds_and_other_goals_dont_break_it() -> None:
     assert sorted(step.behavior for step in outcome.plan.at_level(1)) == [*["REFILL"] * 3, *["SERVE"] * 2]
 
 
-def test_an_operator_is_counted_as_often_as_it_takes() -> None:
+def test_the_heuristic_counts_an_operator_as_many_times_as_the_amount_requires() -> None:
     problem = pouring("0", 0, Fraction(1), refill="0.01")
     problem = replace(problem, goal={Symbol("TEA", ("jug",)): ">=3"})
     outcome = plan_level(problem, 2)
@@ -157,7 +159,7 @@ def test_an_operator_is_counted_as_often_as_it_takes() -> None:
     assert outcome.search[2].expanded < 1000
 
 
-def test_a_product_of_amounts_that_change_is_searched_only_where_states_are_looked_at() -> None:
+def test_the_papers_mode_plans_with_a_product_of_changing_amounts() -> None:
     problem = pouring("1", 1, Fraction(1))
     behavior = problem.domain.behaviors["SERVE"]
     squared = replace(
@@ -169,7 +171,7 @@ def test_a_product_of_amounts_that_change_is_searched_only_where_states_are_look
     assert meets(str(outcome.plan.length[1]), "2")
 
 
-def test_what_stands_in_the_way_of_a_quotient_of_changing_amounts_is_found_by_looking_at_states() -> None:
+def test_a_precondition_on_a_quotient_of_changing_amounts_is_planned_with() -> None:
     shelf, box, mean = Parameter("?s", "Shelf"), Parameter("?b", "Box"), Fraction(3)
     weight, one = Measure("weight", ("?b",)), Fraction(1)
     total, count = (Calculation("+", Amount(n, ("?s",)), by) for n, by in (("TOTAL", weight), ("COUNT", one)))
@@ -190,13 +192,13 @@ def test_what_stands_in_the_way_of_a_quotient_of_changing_amounts_is_found_by_lo
     assert [step.arguments[0] for step in plan.primitives] == ["wood", "iron"]
 
 
-def test_a_world_with_amounts_is_carried_out_to_its_goal() -> None:
+def test_a_plan_with_amounts_is_executed_to_its_goal() -> None:
     execution = confab.load("canteen-small").execute()
     assert execution.reached
     assert not execution.episode.replans
 
 
-def test_what_no_amount_can_be_is_known_before_any_state_is_looked_at() -> None:
+def test_an_amount_beyond_its_bounds_is_proved_unreachable_without_a_search() -> None:
     problem = pouring("1", 2, Fraction(5))  # the jug holds four servings
     outcome = plan_level(problem, 2)
     assert outcome.status is Status.UNSOLVABLE
@@ -204,7 +206,7 @@ def test_what_no_amount_can_be_is_known_before_any_state_is_looked_at() -> None:
     assert solve(Request(problem)).status is Status.UNSOLVABLE
 
 
-def test_what_is_set_to_too_little_is_known_to_bring_nothing_about() -> None:
+def test_an_assignment_of_too_small_an_amount_is_no_achiever() -> None:
     problem = pouring("0.5", 1, Fraction(1), refill=None)
     rinse = Behavior("RINSE", 2, (JUG,), amounts=(AmountEffect("TEA", ("?j",), "assign", Fraction(0)),))
     fill = replace(rinse, name="FILL", amounts=(AmountEffect("TEA", ("?j",), "assign", Fraction(2)),))
@@ -215,7 +217,7 @@ def test_what_is_set_to_too_little_is_known_to_bring_nothing_about() -> None:
         assert outcome.search[2].expanded == 0 or outcome.plan is not None
 
 
-def test_what_is_taken_only_under_a_condition_is_not_counted_as_used_up() -> None:
+def test_an_amount_that_changes_under_a_condition_is_not_counted_as_consumed() -> None:
     domain = """(define (domain shelf) (:requirements :typing :numeric-fluents :conditional-effects) (:types book)
       (:predicates (there ?b - book) (out ?b - book) (lent ?b - book)) (:functions (free))
       (:action tidy :parameters (?b - book) :precondition (>= (free) 1) :effect

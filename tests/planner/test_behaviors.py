@@ -45,7 +45,7 @@ def model(conditions: tuple[Condition, ...], box: str) -> Model:
 
 @pytest.mark.parametrize("conditions", list(permutations((HERE, ALONE, EITHER))))
 @pytest.mark.parametrize(("box", "applicable"), [("shelf", True), ("table", False)])
-def test_a_nested_condition_waits_for_what_another_one_determines(
+def test_a_nested_condition_is_evaluated_after_the_conditions_that_bind_its_variables(
     conditions: tuple[Condition, ...], box: str, applicable: bool
 ) -> None:
     toy = model(conditions, box)
@@ -53,6 +53,6 @@ def test_a_nested_condition_waits_for_what_another_one_determines(
     assert (applied is not None) is applicable
 
 
-def test_a_variable_that_nothing_determines_is_named() -> None:
+def test_a_variable_that_no_condition_determines_is_named() -> None:
     with pytest.raises(DomainError, match=r"GO: nothing determines \?here"):
         model((ValueCondition("AT", ("?thing",), "?here", negated=True),), "shelf")

@@ -40,7 +40,7 @@ def test_shortening_moves_no_filled_cup(name: str, seed: int) -> None:
     assert not filled_and_moved(problem, found)
 
 
-def test_without_the_rule_shortening_would_move_one() -> None:
+def test_without_the_condition_shortening_would_move_a_filled_cup() -> None:
     """This test shows that the test above can fail: without the condition on filled cups, such plans are shorter and are found."""
     problem = family("served", 4, 101)
     move = problem.domain.behaviors["B1_MOVE"]
@@ -53,7 +53,7 @@ def test_without_the_rule_shortening_would_move_one() -> None:
     assert free.length[3] < bound.length[3]
 
 
-def test_plans_that_keep_to_the_rule_are_still_shortened() -> None:
+def test_plans_that_satisfy_the_condition_are_still_shortened() -> None:
     problem = family("blocked", 4, 100)
     first, short = plan(problem, improve=0).plan, plan(problem).plan
     assert first is not None
@@ -61,7 +61,7 @@ def test_plans_that_keep_to_the_rule_are_still_shortened() -> None:
     assert short.length[3] < first.length[3]
 
 
-def test_what_a_level_asks_is_said_in_the_lower_level_s_terms() -> None:
+def test_preconditions_of_a_level_are_translated_into_the_terms_of_the_lower_level() -> None:
     problem = tabletop()
     own = problem.domain.behaviors["B2_PLACE"].preconditions
     bound = binding(problem, 2).behaviors["B2_PLACE"].preconditions
@@ -76,6 +76,6 @@ def test_values_between_those_of_the_upper_level_are_free() -> None:
     assert binding(problem, 2).behaviors["B2_PICK"] == problem.domain.behaviors["B2_PICK"]
 
 
-def test_the_uppermost_level_is_bound_by_nothing() -> None:
+def test_the_first_level_gets_no_additional_preconditions() -> None:
     problem = tabletop()
     assert binding(problem, 1) == problem.domain

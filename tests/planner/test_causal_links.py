@@ -59,16 +59,16 @@ def check(problem: Problem) -> int:
 
 
 @pytest.mark.parametrize("block", range(3))
-def test_on_random_worlds_what_is_named_breaks(block: int) -> None:
+def test_a_plan_in_a_random_world_fails_without_the_fact_that_a_step_is_needed_for(block: int) -> None:
     assert sum(check(hierarchy(seed)) for seed in range(1000 + 8 * block, 1008 + 8 * block)) > 60
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.__name__)
-def test_on_the_cases_of_levels_what_is_named_breaks(case) -> None:  # type: ignore[no-untyped-def]
+def test_a_plan_of_a_case_with_levels_fails_without_the_fact_that_a_step_is_needed_for(case) -> None:  # type: ignore[no-untyped-def]
     assert check(case().problem) > 0
 
 
-def test_on_the_table_every_step_is_needed_and_the_first_level_for_the_goal() -> None:
+def test_every_step_of_the_tabletop_plan_is_needed_and_steps_of_level_1_for_a_goal() -> None:
     problem = tabletop()
     plan = default(problem).plan
     assert plan is not None
@@ -78,7 +78,7 @@ def test_on_the_table_every_step_is_needed_and_the_first_level_for_the_goal() ->
     assert check(problem) > 60
 
 
-def test_a_step_that_nothing_needs_is_said_to_be_needed_by_nothing() -> None:
+def test_a_superfluous_step_has_no_purpose() -> None:
     problem = tabletop()
     plan = default(problem).plan
     assert plan is not None
@@ -87,7 +87,7 @@ def test_a_step_that_nothing_needs_is_said_to_be_needed_by_nothing() -> None:
     assert purposes(replace(problem, goal=goal), plan)[wanted.path].needs == ()
 
 
-def test_a_step_that_is_asked_for_is_done_in_a_valid_plan_or_lacks_a_condition_where_it_would_be_done() -> None:
+def test_an_alternative_step_is_in_a_valid_plan_or_has_an_unmet_condition_or_a_reason() -> None:
     told: Counter[str] = Counter()
     for seed in range(5000, 5012):
         problem, rng = hierarchy(seed), Random(seed)

@@ -38,7 +38,7 @@ def answered(case: str, mode: Mode) -> Outcome:
 @pytest.mark.parametrize(
     "case", ["false-unsolvable-1", "false-unsolvable-2", "no-operators-solvable", "equal-to-itself"]
 )
-def test_what_a_few_steps_solve_is_not_called_unsolvable(case: str, mode: Mode) -> None:
+def test_a_task_with_a_short_plan_is_not_called_unsolvable(case: str, mode: Mode) -> None:
     outcome = answered(f"{case}.ttl", mode)
     assert outcome.plan is not None and len(outcome.plan.primitives) <= 2
 
@@ -62,7 +62,7 @@ def test_the_reason_is_the_cause_that_no_behaviour_changes(mode: Mode) -> None:
     )
 
 
-def test_goals_about_one_object_that_exclude_each_other_with_what_rests_are_unsolvable() -> None:
+def test_goals_about_one_object_that_exclude_each_other_given_rest_values_are_unsolvable() -> None:
     outcome = confab.load("beverage-serving").plan("left_hand HOLDS cup1", mode="paper", time_limit=20.0).outcome
     assert outcome.status is Status.UNSOLVABLE and outcome.certificate is not None
     goals = {"left_hand HOLDS cup1", "cup1 LOCATION location7", "left_hand HAND_POSITION raised"}
@@ -94,7 +94,7 @@ def unsolvable(seeds: range) -> Iterator[tuple[Problem, Certificate]]:
             yield problem, certificate
 
 
-def test_in_random_worlds_exactly_what_has_no_plan_has_a_certificate() -> None:
+def test_in_random_worlds_exactly_the_tasks_without_a_plan_have_a_certificate() -> None:
     for seed in range(15):
         problem, certificate = certificate_of(seed)
         assert (certificate is None) == bool(solvable(problem)), seed
@@ -129,7 +129,7 @@ def test_a_certificate_proves_nothing_of_a_task_that_has_a_plan() -> None:
     assert tried > 5
 
 
-def test_a_certificate_survives_being_written_and_a_broken_one_is_named() -> None:
+def test_a_certificate_survives_a_round_trip_and_a_broken_one_is_refused() -> None:
     for _, certificate in unsolvable(range(20)):
         assert certificate_from(json.loads(json.dumps(certificate_json(certificate)))) == certificate
     for broken in (
@@ -143,7 +143,7 @@ def test_a_certificate_survives_being_written_and_a_broken_one_is_named() -> Non
             certificate_from(json.loads(broken))
 
 
-def test_what_cant_be_certified_is_given_up() -> None:
+def test_an_unsolvable_answer_without_an_accepted_certificate_becomes_gave_up() -> None:
     problem = next(hierarchy(seed) for seed in range(100) if solvable(hierarchy(seed)))
     said = certified(problem, Outcome(Status.UNSOLVABLE, reason=Reason("so it seems")))
     assert said.status is Status.GAVE_UP and said.certificate is None and said.reason is not None
@@ -167,7 +167,7 @@ def test_json_has_the_certificate_and_the_checker_accepts_it() -> None:
     assert Fact(Symbol("LOCK", ("cabinet0",)), "unlocked") in certificate.never
 
 
-def test_a_condition_that_a_variable_is_itself_leaves_it_open() -> None:
+def test_the_equality_of_a_variable_with_itself_binds_no_variable() -> None:
     itself = EqualityCondition("?c", "?c")
     move = behavior("MOVE", 1, "?c:Cup", [itself], [becomes("AT", "?c", "sink")])
     at = SituationType("AT", ("Cup",), "Place")
@@ -179,7 +179,7 @@ def test_a_condition_that_a_variable_is_itself_leaves_it_open() -> None:
 
 
 @pytest.mark.parametrize("first", [9_000_270, 9_000_150])
-def test_in_mixed_worlds_exactly_what_has_no_plan_has_a_certificate(first: int) -> None:
+def test_in_mixed_worlds_exactly_the_tasks_without_a_plan_have_a_certificate(first: int) -> None:
     for seed in range(first, first + 20):
         drawn = mixed(seed).problem
         behaviors = {name: spread(one, drawn.classes) for name, one in drawn.domain.behaviors.items()}
@@ -193,7 +193,7 @@ def test_in_mixed_worlds_exactly_what_has_no_plan_has_a_certificate(first: int) 
         assert certificate is None or refusal(problem, certificate) is None, seed
 
 
-def test_few_states_that_a_search_has_examined_are_the_first_proof_that_is_tried() -> None:
+def test_states_that_a_search_has_exhausted_are_the_first_certificate_that_is_tried() -> None:
     doors = ("closet_dining", "closet_office", "closet_trash", "dining_trash", "kitchen_office", "kitchen_trash")
     stuck = confab.load("rooms-battery").with_fact(
         *(f"hall_{door} DOOR_OPEN false" for door in doors),

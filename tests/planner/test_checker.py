@@ -116,12 +116,14 @@ P, Q = "?p:Place", "?p:Place ?q:Place"
         ([AnyOf(((has("AT", "?c", "?p"),),)), has("AT", "cup1", "?p")], P, "1"),
     ],
 )
-def test_what_can_be_done_is_what_the_conditions_say(conditions: list[Condition], variables: str, cups: str) -> None:
+def test_a_behaviour_is_applicable_exactly_if_its_conditions_hold(
+    conditions: list[Condition], variables: str, cups: str
+) -> None:
     assert done(shelves(*conditions, variables=variables)) == cups
     assert done(shelves(*reversed(conditions), variables=variables)) == cups
 
 
-def test_arguments_have_to_be_as_many_and_of_the_classes_that_are_asked_for() -> None:
+def test_arguments_must_have_the_number_and_classes_of_the_parameters() -> None:
     problem = shelves(terms="?c:Cup ?p:Place")
     do = problem.domain.behaviors["DO"]
     assert successor(problem, do, ("cup1", "low"), problem.initial) is not None
@@ -129,7 +131,7 @@ def test_arguments_have_to_be_as_many_and_of_the_classes_that_are_asked_for() ->
         assert successor(problem, do, wrong, problem.initial) is None
 
 
-def test_a_conditional_effect_is_made_where_its_condition_held_before() -> None:
+def test_a_conditional_effect_is_applied_if_its_condition_held_before_the_step() -> None:
     effects = [
         becomes("AT", "?c", "?q", when=(has("AT", "?c", "?p"), RelationCondition("above", ("?p", "?q")))),
         becomes("FULL", "?c", FALSE, when=(has("FULL", "?c", TRUE),)),
@@ -145,14 +147,14 @@ def test_a_conditional_effect_is_made_where_its_condition_held_before() -> None:
         assert Symbol("NEAR", (cup, "cup1")) not in state  # the symbol doesn't exist
 
 
-def test_what_becomes_true_and_false_at_once_is_true() -> None:
+def test_a_fact_that_a_step_makes_true_and_false_is_true() -> None:
     both = behavior("BOTH", 1, "?c:Cup", [], [becomes("FULL", "?c", TRUE), becomes("FULL", "?c", FALSE)])
     state = successor(shelves(), both, ("cup1",), shelves().initial)
     assert state is not None
     assert state[Symbol("FULL", ("cup1",))] == TRUE
 
 
-def test_facts_remember_what_was_overwritten() -> None:
+def test_facts_remember_their_overwritten_values() -> None:
     facts = Facts(shelves(), shelves().initial)
     assert [facts.value("FULL", (cup,)) for cup in ("cup1", "cup2", "floor")] == [FALSE, TRUE, None]
     assert list(facts.holders("AT", "low")) == [("cup2",), ("cup3",)]
@@ -172,7 +174,7 @@ def test_facts_remember_what_was_overwritten() -> None:
     assert facts.state()[Symbol("AT", ("cup2",))] == "low"
 
 
-def test_who_satisfies_conditions_is_told() -> None:
+def test_individuals_that_satisfy_conditions_are_returned() -> None:
     problem = shelves()
     facts, kinds = Facts(problem, problem.initial), {"?c": "Cup", "?p": "Place"}
     conditions = [has("AT", "?c", "?p"), has("FULL", "?c", TRUE)]
@@ -184,7 +186,7 @@ def test_who_satisfies_conditions_is_told() -> None:
     }
 
 
-def test_relations_are_found_by_what_stands_at_a_place() -> None:
+def test_relations_are_indexed_by_each_argument() -> None:
     rules = BehaviorReader(shelves())
     assert rules.related("above", 0) == {"high": [("high", "low")], "low": [("low", "floor")]}
     assert rules.related("above", 1) == {"low": [("high", "low")], "floor": [("low", "floor")]}
@@ -195,14 +197,14 @@ def step(level: int, name: str = "DO", *arguments: str, id: int = 0) -> Step:
     return Step((), id, level, name, arguments or ("cup1",))
 
 
-def test_lower_steps_stand_together_between_those_of_a_level() -> None:
+def test_steps_of_lower_levels_are_grouped_between_the_steps_of_a_level() -> None:
     one, low, lower = step(1), step(2), step(3)
     assert list(stretches([one, low, lower, one, one, low], 1)) == [[one], [low, lower], [one], [one], [low]]
     assert list(stretches([low, one], 1)) == [[low], [one]]
     assert list(stretches([], 1)) == []
 
 
-def test_a_plan_is_told_each_thing_that_is_wrong_with_it() -> None:
+def test_the_checker_reports_each_kind_of_fault_of_a_step() -> None:
     problem = shelves(has("FULL", "?c", FALSE))
     assert validate(problem, Plan((step(1),))) == []
     said = [fault.text for fault in validate(problem, Plan((step(1), step(1))))]
@@ -216,7 +218,7 @@ def test_a_plan_is_told_each_thing_that_is_wrong_with_it() -> None:
         )
 
 
-def test_after_a_step_that_cannot_be_done_nothing_more_is_said() -> None:
+def test_the_checker_reports_no_faults_after_a_step_that_is_not_applicable() -> None:
     problem = replace(shelves(has("FULL", "?c", FALSE)), goal={Symbol("AT", ("cup1",)): "floor"})
     for wrong in (step(1, "DONE"), step(1, "DO", "cup2", id=1)):
         assert len(validate(problem, Plan((wrong, wrong)))) == 1
@@ -224,7 +226,7 @@ def test_after_a_step_that_cannot_be_done_nothing_more_is_said() -> None:
     assert fault.text == "the goal <cup1, AT> = floor isn't reached: it is high in the end"
 
 
-def test_amounts_change_beside_values_and_a_price_is_worked_out() -> None:
+def test_a_step_changes_amounts_and_values_and_its_price_is_calculated() -> None:
     fill = SituationType("FILL", ("Cup",), "FILL", quantity=Quantity("", least=Fraction(0)))
     pour = replace(
         behavior("POUR", 1, "?c:Cup", [has("AT", "?c", "low")], [becomes("FULL", "?c", FALSE)]),

@@ -31,7 +31,7 @@ def test_equation_2_raises_by_lambda_and_normalises() -> None:
 
 
 @given(st.lists(st.sampled_from("abcd"), max_size=30), st.floats(0.01, 2.0))
-def test_links_stay_a_distribution_whatever_is_learned(seen: list[str], learning: float) -> None:
+def test_links_stay_a_probability_distribution_after_learning(seen: list[str], learning: float) -> None:
     links = Links()
     for value in seen:
         reinforce(links, GO, {CUP: value}, TOY, 1, learning)
@@ -40,7 +40,7 @@ def test_links_stay_a_distribution_whatever_is_learned(seen: list[str], learning
     assert all(0.0 < p <= 1.0 for p in table.values())
 
 
-def test_what_was_learned_is_more_cogent_where_it_was_learned_and_less_elsewhere() -> None:
+def test_a_learned_step_is_more_cogent_in_the_learned_state_and_less_in_others() -> None:
     links = Links()
     reinforce(links, GO, {CUP: "a"}, TOY, 1, PAPER.learning)
     here = cogencies(links, [GO, STAY], {CUP: "a"}, TOY, 1)

@@ -105,16 +105,14 @@ def test_explanations_name_the_constraint() -> None:
         ("c:never true", 'c:never "maybe"', "never is 'maybe'; wanted true or false"),
     ],
 )
-def test_a_constraint_that_makes_no_sense_is_refused_with_the_remedy(
-    tmp_path: Path, old: str, new: str, message: str
-) -> None:
+def test_an_invalid_constraint_is_refused_with_the_remedy(tmp_path: Path, old: str, new: str, message: str) -> None:
     scene = changed(tmp_path, old, new)
     with pytest.raises(KnowledgeError, match=message):
         confab.load(scene).plan()
     assert any("never" in str(row) and "error" in str(row) for row in confab.validate(scene))
 
 
-def test_a_violation_that_others_cause_is_removed() -> None:
+def test_a_violation_of_a_constraint_by_an_intervention_is_removed() -> None:
     """An observed state may violate a constraint; the plan from this state adds no exception."""
     done = confab.load("drums-small").execute(interventions=["after=2 base IN bay3"])
     assert done.reached

@@ -26,7 +26,9 @@ from worlds.writing import becomes, behavior, has, lacks, world
 
 @pytest.mark.parametrize("make", [jugs, rounds])
 @pytest.mark.parametrize("seed", range(10))
-def test_a_plan_said_to_be_cheapest_is(seed: int, make: Callable[[Random], tuple[Problem, Fraction | None]]) -> None:
+def test_a_plan_that_is_reported_as_cheapest_is_cheapest(
+    seed: int, make: Callable[[Random], tuple[Problem, Fraction | None]]
+) -> None:
     problem, least = make(Random(seed))
     found = solve(Request(problem, "optimal", Limits(1_000_000, 30.0)))
     if least is None:
@@ -88,7 +90,7 @@ def lift(ways: list[tuple[int, int]], floors: int) -> Problem:
     )
 
 
-def test_a_default_plan_buys_what_makes_the_later_steps_cheap() -> None:
+def test_a_default_plan_buys_an_object_that_makes_later_steps_cheaper() -> None:
     problem = tour(9)
     outcome = solve(Request(problem))
     assert outcome.plan is not None
@@ -98,7 +100,7 @@ def test_a_default_plan_buys_what_makes_the_later_steps_cheap() -> None:
     assert cost_of(problem, found) == 2 * 4 + 5 + 6 * 0.5 + 9
 
 
-def test_a_default_plan_takes_people_along_in_one_round() -> None:
+def test_a_default_plan_transports_all_people_in_one_round() -> None:
     """Up and down once: twice five floors, and each of six people enters and leaves."""
     found = solve(Request(lift([(0, 4), (2, 5), (1, 3), (5, 1), (4, 0), (3, 2)], 6)))
     assert found.plan is not None
@@ -138,7 +140,7 @@ DELIVERY = """@prefix : <https://example.org/van#> .
 """
 
 
-def test_a_price_in_turtle_leads_to_the_cheapest_plan_and_is_told(tmp_path: Path) -> None:
+def test_a_price_in_turtle_leads_to_the_cheapest_plan_and_is_printed(tmp_path: Path) -> None:
     path = tmp_path / "van.ttl"
     path.write_text(DELIVERY)
     found = confab.load(path).plan(optimal=True)
@@ -156,7 +158,7 @@ def test_a_cost_beside_a_price_is_refused(tmp_path: Path) -> None:
         confab.load(path).plan()
 
 
-def test_a_price_of_what_changes_survives_pddl_and_the_file_made_of_it(tmp_path: Path) -> None:
+def test_a_price_that_depends_on_changing_values_survives_pddl_and_turtle(tmp_path: Path) -> None:
     """Functions have typed arguments: otherwise each place would need a load."""
     path = tmp_path / "van.ttl"
     path.write_text(DELIVERY)

@@ -39,7 +39,7 @@ def slide(items: int, packed: bool = False) -> Problem:
     )  # fmt: skip
 
 
-def test_a_refinement_after_which_a_goal_is_out_of_reach_is_made_again_so_that_it_leaves_what_was() -> None:
+def test_a_refinement_that_makes_a_goal_unreachable_is_replaced_by_another_one() -> None:
     problem = slide(3)
     outcome = plan(problem)
     assert outcome.status is Status.SOLVED
@@ -50,7 +50,7 @@ def test_a_refinement_after_which_a_goal_is_out_of_reach_is_made_again_so_that_i
     assert outcome.plan.length[2] <= 6
 
 
-def test_where_goals_in_series_lead_astray_level_1_is_begun_again_and_kept() -> None:
+def test_planning_restarts_after_a_dead_end_of_goals_in_series_and_keeps_level_1() -> None:
     problem = slide(12, packed=True)
     outcome = plan(problem)
     assert outcome.plan is not None
@@ -59,7 +59,7 @@ def test_where_goals_in_series_lead_astray_level_1_is_begun_again_and_kept() -> 
     assert outcome.plan.length[1] == 24
 
 
-def test_goals_that_must_come_in_an_order_that_one_alone_does_not_show_are_reached_on_level_1() -> None:
+def test_goals_with_a_necessary_order_are_achieved_on_level_1() -> None:
     """A cell can be marked only if no cell is plain; a plain cell can be stirred, and never becomes plain again."""
     none_plain = Witness("?o", "Cell", (lacks("FILL", "?o", "empty"), lacks("FILL", "?o", "stirred")), negated=True)
     empty, open_ = has("FILL", "?c", "empty"), has("LID", "lid", "open")
@@ -94,7 +94,7 @@ def test_goals_that_must_come_in_an_order_that_one_alone_does_not_show_are_reach
     assert [str(step.behavior) for step in outcome.plan.steps] == ["FILL_UP", "STIR", "MARK", "FILL_UP"]
 
 
-def test_fewer_steps_bring_about_what_level_1_does_not_see_too() -> None:
+def test_a_plan_with_fewer_steps_also_achieves_the_goals_that_level_1_does_not_see() -> None:
     """Each room needs a towel, one wash cleans all towels, and the maid must be at home in the end."""
     rooms, towels, places = ("a", "b", "c"), ("t1", "t2", "t3"), ("home", "hall")
     clean = [has("CLEAN", "?r", FALSE), has("USED", "?t", FALSE)]
@@ -124,7 +124,7 @@ def test_fewer_steps_bring_about_what_level_1_does_not_see_too() -> None:
     assert outcome.plan.length == {1: 4, 2: 5}
 
 
-def test_planning_again_searches_for_no_refinement_that_was_found_or_sought_before() -> None:
+def test_a_fresh_call_repeats_no_search_for_a_refinement() -> None:
     problem = slide(3)
     call = Call(problem, compiled(problem), None, 10_000)
     first, second = (call.refiner.do(1, "SEND", (item,)) for item in ("item0", "item1"))
@@ -137,7 +137,7 @@ def test_planning_again_searches_for_no_refinement_that_was_found_or_sought_befo
     assert other.space.worked == 0
 
 
-def test_what_level_1_does_not_see_and_all_goals_at_once_undid_is_a_goal_again() -> None:
+def test_a_goal_that_level_1_does_not_see_is_achieved_again_after_it_was_undone() -> None:
     problem = hierarchy(8_040_534)
     outcome = plan(problem)
     assert outcome.plan is not None

@@ -72,7 +72,7 @@ def walk(problem: Problem, rng: Random, steps: int) -> Iterator[State]:
 
 
 @given(seed=st.integers(0, 10**9))
-def test_what_is_defined_is_right_in_every_state_of_a_walk(seed: int) -> None:
+def test_derived_facts_are_right_in_every_state_of_a_random_walk(seed: int) -> None:
     problem = language(seed, defined=True)
     table = Table(problem.domain.situations, problem.initial)
     Program(problem).bind(table)
@@ -97,7 +97,7 @@ def test_what_is_defined_is_right_in_every_state_of_a_walk(seed: int) -> None:
 
 
 @given(seed=st.integers(0, 10**9))
-def test_a_plan_is_carried_out_alike_whether_all_that_follows_is_worked_out_or_what_is_asked_for(seed: int) -> None:
+def test_execution_with_the_needed_derived_facts_equals_execution_with_all_of_them(seed: int) -> None:
     task = ground(replace(language(seed, defined=True), goal={}))
     assert isinstance(task, Task)
     if not len(task):
@@ -113,7 +113,7 @@ def test_a_plan_is_carried_out_alike_whether_all_that_follows_is_worked_out_or_w
 
 
 @given(seed=st.integers(0, 10**9))
-def test_a_goal_that_is_defined_holds_for_the_grounded_level_where_it_does(seed: int) -> None:
+def test_a_defined_goal_holds_on_the_grounded_level_exactly_if_it_holds(seed: int) -> None:
     problem = language(seed, defined=True)
     truth = naive.complete(problem)
     wanted = Random(seed).sample(sorted(s for s in truth if s.situation in DEFINED), 2)
@@ -140,7 +140,7 @@ def reachable(problem: Problem, most: int) -> tuple[list[State], bool]:
     return order, True
 
 
-def test_what_is_defined_is_worked_out_where_only_a_change_of_an_amount_asks_for_it() -> None:
+def test_a_derived_fact_that_only_a_conditional_change_of_an_amount_reads_is_derived() -> None:
     """The cart must leave the shade before WET falls below zero; only the change of this amount depends on the shade."""
     cart = Parameter("?c", "Cart")
     shaded = tuple(Rule("SHADED", (cart,), (), (has("AT", "?c", where),)) for where in ("shade", "porch"))
@@ -176,7 +176,7 @@ def test_what_is_defined_is_worked_out_where_only_a_change_of_an_amount_asks_for
 
 @pytest.mark.parametrize("mode", ["guarded", "optimal", "paper"])
 @pytest.mark.parametrize("seed", range(8))
-def test_a_plan_to_what_is_defined_is_found_where_there_is_one(seed: int, mode: str) -> None:
+def test_a_plan_for_a_defined_goal_is_found_exactly_if_one_exists(seed: int, mode: str) -> None:
     problem, rng = unrested(language(seed, defined=True)), Random(seed)
     states, whole = reachable(problem, 60)
     wanted = rng.choice([symbol for symbol in states[0] if symbol.situation in DEFINED])
@@ -187,12 +187,12 @@ def test_a_plan_to_what_is_defined_is_found_where_there_is_one(seed: int, mode: 
             assert (found.status is Status.SOLVED) is there
 
 
-def test_what_nothing_but_itself_would_make_true_ends_with_what_made_it_true() -> None:
+def test_a_derived_fact_that_supports_only_itself_ends_with_its_cause() -> None:
     assert in_parts({0: Bit(1, (1 | 4, 2))}).after(1 | 4, 1 | 2 | 4) == 4
 
 
 @pytest.mark.parametrize("seed", [*range(12), 7062, 7099])
-def test_plans_with_random_axioms_of_pddl_are_as_long_as_trying_everything_finds(seed: int) -> None:
+def test_plans_with_random_axioms_of_pddl_agree_with_exhaustive_search(seed: int) -> None:
     domain, text = axioms(Random(seed))
     least, problem = Plain(domain).shortest(text), imported(parse(domain, text)).problem
     for mode in ("optimal", "guarded"):
@@ -202,7 +202,7 @@ def test_plans_with_random_axioms_of_pddl_are_as_long_as_trying_everything_finds
         assert steps is None or least is None or (len(steps) == least if mode == "optimal" else len(steps) >= least)
 
 
-def test_a_chain_of_a_thousand_is_followed_to_its_end_by_all() -> None:
+def test_all_evaluators_follow_a_chain_of_a_thousand_derived_facts() -> None:
     boxes = tuple(f"box{i}" for i in range(1000))
     inside = SituationType("INSIDE", ("Box", "Box"), "Truth", boolean=True)
     direct = ValueCondition("IN", ("?x",), "?y")
@@ -261,7 +261,9 @@ BY_RULE = """:rule a owl:NamedIndividual, c:Rule ; c:situationType :WORKS_IN ;
 
 @pytest.mark.parametrize("definition", [BY_CHAIN, BY_RULE])
 @pytest.mark.parametrize("mode", ["guarded", "paper"])
-def test_what_is_defined_by_a_lower_level_exists_from_there_on(tmp_path: Path, definition: str, mode: str) -> None:
+def test_a_situation_type_that_is_defined_by_a_lower_level_exists_from_this_level_on(
+    tmp_path: Path, definition: str, mode: str
+) -> None:
     path = tmp_path / "crane.ttl"
     path.write_text(CRANE + definition)
     problem = read(load(path)).problem
@@ -282,7 +284,7 @@ def following(rng: Random) -> dict[int, Bit]:
 
 
 @given(seed=st.integers(0, 10**9))
-def test_what_follows_is_the_same_worked_out_by_arrays_and_by_counting(seed: int) -> None:
+def test_derivation_with_arrays_and_with_counters_gives_the_same_facts(seed: int) -> None:
     rng = Random(seed)
     first, bits = 6, following(rng)
     changes, above = (
@@ -303,7 +305,7 @@ def test_what_follows_is_the_same_worked_out_by_arrays_and_by_counting(seed: int
 
 
 @given(seed=st.integers(0, 10**9))
-def test_what_few_changes_can_make_of_what_follows_is_told_by_less(seed: int) -> None:
+def test_derivation_can_be_limited_to_facts_that_given_changes_affect(seed: int) -> None:
     rng = Random(seed)
     bits = following(rng)
     bits[18] = Bit(1 << 18, (1 << rng.randrange(6, 18),), opposite=True)

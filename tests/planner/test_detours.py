@@ -46,14 +46,14 @@ def test_a_chest_is_locked_once_where_a_plan_that_keeps_the_levels_would_be_half
     assert len(names(chest(4), leave_levels=False)) == 20
 
 
-def test_a_plan_that_is_little_longer_with_its_levels_keeps_them() -> None:
+def test_a_plan_that_is_slightly_longer_with_its_levels_keeps_them() -> None:
     found = plan(chest(1)).plan
     assert found is not None
     assert found.length == {1: 1, 2: 5}
 
 
 @pytest.mark.parametrize("items", [2, 3, 5])
-def test_what_comes_to_nothing_is_left_out_from_the_inside_out(items: int) -> None:
+def test_pairs_of_steps_that_cancel_each_other_are_removed_from_the_inside_out(items: int) -> None:
     problem = chest(items)
     call = Call(problem, compiled(problem), None, 1000)
     for item in range(items):

@@ -89,7 +89,7 @@ def test_a_step_whose_condition_might_end_too_early_is_held_back(match: int, men
     assert len(run.waiting) == held_back
 
 
-def test_a_deadline_that_can_no_longer_be_kept_is_said_as_soon_as_this_is_known() -> None:
+def test_a_missed_deadline_is_reported_as_soon_as_it_is_certain() -> None:
     problem, timed = served()
     goal = next(s for s in problem.goal if any(s.arguments[0] in slot.step.arguments for slot in timed.slots))
     strict = replace(problem, times=Times(deadlines={Symbol(goal.situation, goal.arguments): Fraction(1)}))

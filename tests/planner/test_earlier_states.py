@@ -93,9 +93,7 @@ def test_the_bridge_is_crossed_once_tickets_come_before_the_museum_and_all_sight
         ("c:onlyAfter :BUYING ; ", "IN_MUSEUM must be true only after BUYING, and is true after it"),
     ],
 )
-def test_the_checker_knows_the_definitions_and_not_the_effects_that_are_added(
-    old: str, fault: str, tmp_path: Path
-) -> None:
+def test_the_checker_enforces_the_definitions_without_the_added_effects(old: str, fault: str, tmp_path: Path) -> None:
     free = confab.load(tour(tmp_path, old, "")).plan(optimal=True).plan
     assert len(free.steps) < 9
     problem = confab.load("tour-small").problem
@@ -104,7 +102,7 @@ def test_the_checker_knows_the_definitions_and_not_the_effects_that_are_added(
     assert not carried_out(without_added_parts(problem), confab.load("tour-small").plan().plan)
 
 
-def test_what_happens_within_a_step_of_an_upper_level_is_remembered(tmp_path: Path) -> None:
+def test_a_fact_that_holds_only_within_a_step_of_an_upper_level_is_remembered(tmp_path: Path) -> None:
     """The acid would be on the forklift twice, and only level 2 sees this. No behaviour carries the acid back to make room."""
     scenes = ontology.ROOT / "scenes"
     domain = (ontology.ROOT / "domains" / "drums.ttl").read_text("utf-8")
@@ -138,7 +136,7 @@ def test_an_intervention_is_remembered_and_cannot_make_a_remembered_situation_fa
         scene.execute(interventions=["after=1 station SEEN false"])
 
 
-def test_queries_find_what_is_remembered_initially_in_scenes_with_constraints() -> None:
+def test_queries_find_initially_remembered_facts_in_scenes_with_constraints() -> None:
     found = confab.load("tour-small").query(
         "PREFIX d: <https://w3id.org/confab/tour#> SELECT ?p { ?f :situationType d:SEEN ; :about ?p }"
     )
@@ -153,7 +151,7 @@ def test_the_constraints_of_pddl_hold_and_become_goals(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("both", [False, True])
-def test_before_means_an_earlier_state_as_in_pddl(both: bool, tmp_path: Path) -> None:
+def test_sometime_before_requires_an_earlier_state_as_in_pddl(both: bool, tmp_path: Path) -> None:
     """An action that makes both conditions true at the same time violates ``sometime-before``."""
     domain = f"""(define (domain d) (:predicates (a) (b)) (:constraints (sometime-before (b) (a)))
       (:action both :parameters () :precondition () :effect (and (a) (b)))
@@ -164,14 +162,14 @@ def test_before_means_an_earlier_state_as_in_pddl(both: bool, tmp_path: Path) ->
 
 
 @pytest.mark.filterwarnings("ignore")  # unified-planning uses deprecated functions of pyparsing
-def test_an_export_has_the_effects_that_remember(tmp_path: Path) -> None:
+def test_an_export_has_the_effects_that_record_remembered_facts(tmp_path: Path) -> None:
     domain, problem = confab.load(pddl(tmp_path, TRIP, ROADS)).to_pddl()
     assert not imported(parse(domain, problem)).problem.domain.remembers
     read = pytest.importorskip("unified_planning.io").PDDLReader().parse_problem_string(domain, problem)
     assert any(effect.is_conditional() and "held" in str(effect.fluent) for effect in read.action("go").effects)
 
 
-def test_random_worlds_that_remember_are_answered_as_exhaustive_search_answers(tmp_path: Path) -> None:
+def test_random_worlds_with_remembered_facts_have_the_answers_of_exhaustive_search(tmp_path: Path) -> None:
     remembering = 0
     for seed in range(497_900_000, 497_900_008):
         world = mixed(seed, remembered=1.0)

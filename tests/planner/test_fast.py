@@ -60,7 +60,7 @@ def test_the_papers_task_takes_4_steps_10_steps_and_32_steps() -> None:
 
 @pytest.mark.parametrize("n", [4, 10, 20, 50])
 @pytest.mark.parametrize("name", EASY)
-def test_every_family_is_solved_without_falling_back(name: str, n: int) -> None:
+def test_every_family_is_solved_without_a_fallback(name: str, n: int) -> None:
     problem = family(name, n)
     outcome = plan(problem, limits=Limits(seconds=60))
     assert outcome.status is Status.SOLVED
@@ -81,7 +81,7 @@ def test_other_numbers_of_hands_are_served(hands: int) -> None:
 
 
 @pytest.mark.parametrize("name", ["served", "swap", "rotate"])
-def test_whoever_of_many_a_condition_looks_for_is_in_the_small_world(name: str) -> None:
+def test_the_scope_of_a_search_contains_a_hand_that_satisfies_an_existential_condition(name: str) -> None:
     """One of eight hands must reach both places: a scope without such a hand has no plan, so the whole level would be searched."""
     outcome = plan(family(name, 20, hands=8))
     assert outcome.plan is not None
@@ -89,7 +89,7 @@ def test_whoever_of_many_a_condition_looks_for_is_in_the_small_world(name: str) 
     assert outcome.search[1].evaluated < 500  # in the whole world, thousands are evaluated
 
 
-def test_a_thousand_objects_are_served_with_an_effort_in_proportion() -> None:
+def test_the_effort_grows_in_proportion_to_the_number_of_objects_up_to_a_thousand() -> None:
     small, large = plan(family("served", 100), improve=0), plan(family("served", 1000), improve=0)
     assert large.plan is not None
     assert large.plan.length[3] > 9000
@@ -150,7 +150,7 @@ def test_two_goals_for_one_place_are_named() -> None:
     assert {"cup1", "cup2", "location4"} <= set(outcome.reason.terms)
 
 
-def test_a_full_table_is_solved_on_the_level_below() -> None:
+def test_a_full_table_is_solved_on_a_lower_level() -> None:
     problem = table(3, 2, 3, 0, [1, 2, 3], {"cup1": 2, "cup2": 1, "cup3": 3}, {}, [{1, 2, 3}, {1, 2, 3}])
     outcome = plan(problem)
     assert outcome.plan is not None
@@ -180,14 +180,14 @@ def test_the_time_limit_is_obeyed(seconds: float) -> None:
     assert min(over) < 0.1 * seconds
 
 
-def test_a_limit_of_expansions_is_obeyed_and_said() -> None:
+def test_a_limit_of_expansions_is_obeyed_and_reported() -> None:
     outcome = plan(family("packed", 30, seed=3), limits=Limits(expansions=50))
     assert outcome.status is Status.GAVE_UP
     assert outcome.reason is not None
     assert "50 expansions" in outcome.reason.text
 
 
-def test_who_gives_up_says_on_the_way_to_which_goal_and_at_which_step() -> None:
+def test_the_reason_for_giving_up_names_the_next_goal_and_the_step_without_refinement() -> None:
     outcome = plan(museum(21), limits=Limits(expansions=50))
     assert outcome.reason is not None
     assert outcome.reason.text == (
@@ -197,7 +197,7 @@ def test_who_gives_up_says_on_the_way_to_which_goal_and_at_which_step() -> None:
     assert {"HANGS", "picture", "room20", "MOVE"} <= set(outcome.reason.terms)
 
 
-def test_improving_never_lengthens_and_stays_valid() -> None:
+def test_improvement_never_lengthens_a_plan_and_keeps_it_valid() -> None:
     for name in ("full", "rotate"):
         problem = family(name, 10, seed=1)
         first, improved = plan(problem, improve=0).plan, plan(problem, improve=20).plan
@@ -207,7 +207,7 @@ def test_improving_never_lengthens_and_stays_valid() -> None:
         assert validate(problem, improved) == []
 
 
-def test_put_down_and_picked_up_again_is_dropped() -> None:
+def test_improvement_removes_a_put_down_that_a_pick_up_undoes() -> None:
     problem = table(4, 2, 2, 0, [1, 2], {"cup1": 2, "cup2": 1}, {}, [{1, 2, 3, 4}, {1, 2, 3, 4}])
     improved = plan(problem).plan
     assert improved is not None
@@ -231,7 +231,7 @@ def test_the_same_input_gives_the_same_plan_in_any_process() -> None:
     assert len(printed) == 1
 
 
-def test_what_was_compiled_and_learned_serves_another_goal() -> None:
+def test_compiled_domains_and_found_refinements_are_reused_for_another_goal() -> None:
     problem = family("served", 10)
     using = compiled(problem)
     plan(problem, using=using)
@@ -252,7 +252,7 @@ def test_a_domain_with_booleans_disjunction_and_keys_is_planned(seed: int) -> No
         assert validate(problem, outcome.plan) == []
 
 
-def test_the_shipped_scene_is_the_table_that_the_families_build_on() -> None:
+def test_the_shipped_scene_has_the_behaviours_of_the_table_of_the_families() -> None:
     assert set(tabletop().domain.behaviors) == set(paper_table().domain.behaviors)
 
 
@@ -266,7 +266,7 @@ def test_a_small_task_takes_as_few_steps_of_the_middle_level_as_any_plan(name: s
     assert len(better.at_level(2)) == steps_of(replace(problem, goal=end | dict(problem.goal)), 2)
 
 
-def test_looking_for_short_plans_only_finds_the_same_shortest_ones() -> None:
+def test_a_search_with_an_upper_bound_finds_the_same_shortest_plans() -> None:
     compared = 0
     for seed in range(40_000, 40_040):
         task = grounded(random_table(seed), 2)
@@ -319,7 +319,7 @@ def test_a_goal_out_of_reach_is_proved_without_grounding_a_large_table() -> None
     assert most < 300e6
 
 
-def test_the_benchmarks_truth_and_exhaustion_agree_though_they_share_no_code() -> None:
+def test_the_state_space_of_the_benchmarks_agrees_with_exhaustive_search() -> None:
     for seed in range(43_000, 43_010):
         problem = random_table(seed)
         try:

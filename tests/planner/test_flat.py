@@ -68,7 +68,7 @@ def test_an_unreachable_goal_is_proved_with_a_reason_in_the_ontologys_terms(tabl
     assert {"cup1", "LOCATION", "location7", "canReach"} <= set(outcome.reason.terms)
 
 
-def test_a_goal_that_nothing_brings_about_is_said_to_be_so(tabletop: Problem) -> None:
+def test_a_goal_without_an_achiever_is_reported(tabletop: Problem) -> None:
     wrong = replace(tabletop, goal={Symbol("BEVERAGE", ("cup1",)): "nothing"})
     reason = solve(Request(wrong)).reason
     assert reason == Reason(
@@ -77,7 +77,7 @@ def test_a_goal_that_nothing_brings_about_is_said_to_be_so(tabletop: Problem) ->
     )
 
 
-def test_exhaustion_is_a_proof() -> None:
+def test_an_exhausted_search_proves_that_no_plan_exists() -> None:
     problem = corridor(4)  # a plan back and forth is impossible, because the path is one-way
     places = problem.classes["Place"]
     goal = {Symbol("LIT", (places[3],)): TRUE, Symbol("AT", ("x",)): places[0]}
@@ -86,7 +86,7 @@ def test_exhaustion_is_a_proof() -> None:
     assert "all reachable states were searched" in outcome.reason.text
 
 
-def test_limits_are_said_to_be_limits() -> None:
+def test_a_search_at_a_limit_gives_up_and_names_the_limit() -> None:
     problem = corridor(60)
     few = plan_level(problem, limits=Limits(expansions=3))
     assert few.status is Status.GAVE_UP and few.reason is not None and "3 expansions" in few.reason.text
@@ -100,7 +100,7 @@ def test_a_join_that_is_too_large_is_refused(tabletop: Problem) -> None:
 
 
 @pytest.mark.parametrize("seconds", [0, 5, 20])
-def test_a_time_limit_is_kept_to(seconds: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_search_ends_at_its_time_limit(seconds: int, monkeypatch: pytest.MonkeyPatch) -> None:
     evaluated = 0  # the simulated clock: each evaluation takes a second, however busy the machine is
 
     def slow(task: Task) -> Evaluate:
@@ -184,7 +184,7 @@ def test_the_tree_gives_the_operators_that_are_applicable(tabletop: Problem) -> 
             state = task.applied(state, choice.choice(operators)) or 0
 
 
-def test_what_every_plan_passes_is_a_landmark() -> None:
+def test_facts_that_hold_in_every_plan_are_landmarks() -> None:
     task = ground(carrier(1))
     assert isinstance(task, Task)
     names = {str(fact) for bit, fact in enumerate(task.facts) if landmarks(task) >> bit & 1}
@@ -228,7 +228,7 @@ def test_windows_make_a_plan_shorter_and_it_still_leads_to_the_goal() -> None:
     assert shorter(task, first, work=0) == shortened(task, first)
 
 
-def test_a_long_way_to_what_one_step_does_is_saved() -> None:
+def test_several_steps_with_the_effect_of_one_step_are_replaced_by_it() -> None:
     """A plan that fetches a bomb from the end of the road for each door is shortened, since doors also open without bombs."""
     domain = """(define (domain mine) (:predicates (at ?x) (road ?x ?y) (store ?x) (bomb) (open ?x) (door ?x ?y))
       (:action go :parameters (?x ?y) :precondition (and (at ?x) (road ?x ?y)) :effect (and (not (at ?x)) (at ?y)))
@@ -255,7 +255,7 @@ def test_a_long_way_to_what_one_step_does_is_saved() -> None:
     assert len(shorter(task, plan, 200_000)) == len(doors)
 
 
-def test_a_window_does_not_look_at_what_the_steps_behind_it_need_as_it_is() -> None:
+def test_windows_shorten_a_plan_of_single_parcels_to_two_parcels_per_trip() -> None:
     task = ground(carrier(40))
     assert isinstance(task, Task)
     number = {task.describe(operator)[:2]: operator for operator in range(len(task))}
@@ -270,7 +270,7 @@ def test_a_window_does_not_look_at_what_the_steps_behind_it_need_as_it_is() -> N
     )  # two at a time; picking another parcel in between is useless
 
 
-def test_regrouped_steps_stand_behind_what_they_depend_on(tabletop: Problem) -> None:
+def test_regrouped_steps_stand_behind_the_steps_on_which_they_depend(tabletop: Problem) -> None:
     task = ground(tabletop, goal=tabletop.goal_on(3))
     assert isinstance(task, Task)
     plan = list(search(task).plan)
@@ -279,7 +279,7 @@ def test_regrouped_steps_stand_behind_what_they_depend_on(tabletop: Problem) -> 
     assert validate(tabletop, Plan(task.steps(again))) == []
 
 
-def test_a_lookahead_drives_back_for_what_is_left() -> None:
+def test_a_lookahead_drives_back_for_the_remaining_goals() -> None:
     task = ground(carrier(12))
     assert isinstance(task, Task)
     evaluation = heuristic(task)(task.initial)
@@ -290,7 +290,7 @@ def test_a_lookahead_drives_back_for_what_is_left() -> None:
     assert len(path) <= 4 * 12 + 1  # one parcel at a time, there and back
 
 
-def test_a_lookahead_replaces_what_is_stuck() -> None:
+def test_a_lookahead_replaces_a_step_that_is_not_applicable() -> None:
     domain = """(define (domain collect) (:predicates (way ?p ?q) (me ?p) (at ?x ?p) (have ?x))
      (:action go :parameters (?p ?q) :precondition (and (way ?p ?q) (me ?p)) :effect (and (me ?q) (not (me ?p))))
      (:action take :parameters (?x ?p) :precondition (and (me ?p) (at ?x ?p)) :effect (and (have ?x) (not (at ?x ?p)))))"""
@@ -313,14 +313,14 @@ def test_a_lookahead_replaces_what_is_stuck() -> None:
     assert reached == state
 
 
-def test_a_search_that_holds_as_much_as_it_may_gives_up_and_proves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_search_at_its_memory_limit_gives_up_and_proves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("confab.planner.grounded.exploring.MOST_BYTES", 0)
     outcome = plan_level(carrier(40))
     assert outcome.status is Status.GAVE_UP and outcome.reason is not None
     assert outcome.reason.text == "there isn't enough memory to continue planning"
 
 
-def test_a_search_that_runs_out_of_memory_leaves_the_rest_to_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_other_searches_continue_if_one_search_runs_out_of_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Novelty, "candidates", lambda _: iter(np.empty(1 << 55)))
     outcome = plan_level(carrier(8))
     assert outcome.status is Status.SOLVED and outcome.plan is not None
@@ -328,13 +328,13 @@ def test_a_search_that_runs_out_of_memory_leaves_the_rest_to_the_others(monkeypa
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_a_call_that_runs_out_of_memory_gives_up_and_says_so(mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_call_that_runs_out_of_memory_gives_up_with_this_reason(mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(MODES, mode, lambda request: np.empty(1 << 55))
     outcome = solve(Request(carrier(2), mode))
     assert (outcome.status, outcome.plan, outcome.reason) == (Status.GAVE_UP, None, OUT_OF_MEMORY)
 
 
-def test_a_problem_of_one_level_is_planned_as_a_whole_and_in_series_only_where_that_is_too_large(
+def test_a_problem_of_one_level_is_planned_as_a_whole_unless_it_is_too_large(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def series(*_: object) -> bool:
@@ -358,7 +358,7 @@ CORNERS = """(define (problem p) (:domain cube) (:objects a b c d e) (:init (on 
  (:goal (and (on b a c) (off c a b))))"""
 
 
-def test_conditional_effects_that_are_alike_are_joined_once_and_mean_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_similar_conditional_effects_are_joined_once_and_keep_their_meaning(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = imported(parse(TURNED, CORNERS)).problem
     assert len(problem.domain.behaviors["TURN"].effects) == 3 * 5**3
     task = ground(problem)
@@ -370,7 +370,7 @@ def test_conditional_effects_that_are_alike_are_joined_once_and_mean_the_same(mo
     assert reached_by(task, 4) == reached_by(singly, 4)
 
 
-def test_why_one_of_many_conditional_effects_is_never_made_is_said_of_that_one() -> None:
+def test_the_reason_names_the_conditional_effect_that_is_never_applied() -> None:
     reason = solve(Request(imported(parse(TURNED, CORNERS.replace("(off c a b)", "(off e e e)"))).problem)).reason
     assert reason is not None
     assert reason.text == "e OFF e e true can't be reached: TURN requires e ON e e true, which never holds"

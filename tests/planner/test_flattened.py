@@ -43,7 +43,7 @@ def test_a_plan_that_leaves_a_level_has_no_more_steps_than_needed(seed: int) -> 
     assert len(ours.plan.primitives) <= 1.2 * len(paper.plan.primitives)
 
 
-def test_a_small_world_of_one_level_is_planned_nearly_as_short_as_can_be() -> None:
+def test_plans_of_small_worlds_of_one_level_are_nearly_shortest() -> None:
     known = []
     for seed in range(700_000, 700_040):
         problem = lowest(hierarchy(seed))
@@ -54,7 +54,7 @@ def test_a_small_world_of_one_level_is_planned_nearly_as_short_as_can_be() -> No
     assert max(known) <= 1.2
 
 
-def test_primitives_stand_under_the_levels_above_wherever_these_say_what_a_run_of_them_does() -> None:
+def test_primitives_are_grouped_under_steps_of_upper_levels_that_have_their_joint_effect() -> None:
     kept = 0
     for seed in range(700_000, 700_060):
         problem = hierarchy(seed)
@@ -70,7 +70,7 @@ def test_primitives_stand_under_the_levels_above_wherever_these_say_what_a_run_o
     assert kept > 15
 
 
-def test_what_the_last_resort_finds_keeps_the_levels_where_it_can(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_last_resort_search_keeps_the_levels_in_most_plans(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Agenda, "achieve_all", lambda agenda: False)
     tops = []
     for seed in range(700_000, 700_030):

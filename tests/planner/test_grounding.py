@@ -165,7 +165,7 @@ def test_grounded_and_naive_reading_reach_the_same_states(problem: Problem, apar
 
 @given(problems(), flags)
 @settings(max_examples=40)
-def test_every_operator_is_what_the_behaviour_does(problem: Problem, apart: bool) -> None:
+def test_operators_have_exactly_the_effects_of_the_naive_evaluation(problem: Problem, apart: bool) -> None:
     task = grounded(problem, apart)
     if not isinstance(task, Task):
         return
@@ -225,7 +225,7 @@ def corridor(length: int) -> Problem:
     )
 
 
-def test_what_a_condition_asks_of_one_place_is_worked_out_once_for_each_place() -> None:
+def test_a_condition_on_one_place_is_grounded_once_for_each_place() -> None:
     size = 40
     places, things = tuple(f"p{i:02}" for i in range(size)), tuple(f"x{i:02}" for i in range(size))
     waits = Witness("?x", "Thing", (ValueCondition("AT", ("?x",), "?v"), ValueCondition("LIT", ("?u",), TRUE)))
@@ -262,7 +262,7 @@ def test_what_a_condition_asks_of_one_place_is_worked_out_once_for_each_place() 
     assert asked < 8 * size**2  # and not one operator of an individual for each pair of places
 
 
-def test_who_only_has_to_be_somewhere_is_forgotten_as_soon_as_nothing_asks_for_them() -> None:
+def test_a_join_drops_variables_of_existential_conditions_after_their_last_use() -> None:
     places = tuple(f"p{i}" for i in range(30))
     condition: Condition = RelationCondition("beside", ("?w4", "?w5"))
     for i in range(5, 0, -1):
@@ -303,7 +303,7 @@ def parking(things: int, places: int) -> Problem:
     )
 
 
-def test_by_which_of_many_something_is_done_makes_no_operators_of_its_own() -> None:
+def test_interchangeable_agents_do_not_multiply_the_operators() -> None:
     size = 12
     places, cranes = tuple(f"p{i}" for i in range(size)), tuple(f"c{i}" for i in range(size))
     stands = (ValueCondition("AT", ("?x",), "?u"), ValueCondition("NEAR", ("?y", "?u"), TRUE))
@@ -333,7 +333,9 @@ def test_by_which_of_many_something_is_done_makes_no_operators_of_its_own() -> N
     assert len(search(told).plan) == len(search(apart).plan) == 3
 
 
-def test_what_many_operators_ask_is_said_once_and_means_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_shared_condition_of_many_operators_is_represented_once_with_the_same_meaning(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     found = []
     for least in (1_000_000, 0):
         for module in (meanings, relaxed_changes):
@@ -347,7 +349,7 @@ def test_what_many_operators_ask_is_said_once_and_means_the_same(monkeypatch: py
     assert relaxed[0] is not None and relaxed[1] is not None and relaxed[0][0] == relaxed[1][0]
 
 
-def test_that_nobody_stands_in_a_place_is_said_once_of_each_place() -> None:
+def test_the_condition_that_a_place_is_free_is_represented_once_for_each_place() -> None:
     task = ground(parking(40, 60))
     assert isinstance(task, Task) and len(task) == 2400
     # otherwise each operator would mention 40 things and 60 places

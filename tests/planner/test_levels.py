@@ -45,7 +45,7 @@ def after(problem: Problem, plan: Plan) -> Mapping[Symbol, str]:
 
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.__name__)
-def test_each_case_has_its_plan(case: Callable[[], Case], mode: str) -> None:
+def test_each_case_with_levels_has_the_expected_plan(case: Callable[[], Case], mode: str) -> None:
     wanted = case()
     outcome = MODES[mode](wanted.problem)
     assert outcome.status is Status.SOLVED
@@ -67,7 +67,7 @@ def served(filled: str, to: str) -> Problem:
     return replace(problem, initial=initial, goal={Symbol("LOCATION", ("cup1",)): to})
 
 
-def test_where_a_level_is_left_what_only_that_level_asks_is_named() -> None:
+def test_a_plan_that_leaves_a_level_names_the_violated_preconditions_of_this_level() -> None:
     problem = served("beverage1", "location7")
     outcome = paper(problem)
     assert outcome.plan is not None
@@ -81,7 +81,7 @@ def test_where_a_level_is_left_what_only_that_level_asks_is_named() -> None:
     )
 
 
-def test_a_level_that_may_not_be_left_is_not() -> None:
+def test_the_papers_mode_does_not_leave_a_strict_level() -> None:
     outcome = paper(served("beverage1", "location7"), leave_levels=False)
     assert outcome.status is Status.GAVE_UP
     assert outcome.reason is not None
@@ -90,12 +90,12 @@ def test_a_level_that_may_not_be_left_is_not() -> None:
 
 
 @pytest.mark.parametrize("mode", ["guarded", "paper"])
-def test_no_mode_leaves_a_level_that_may_not_be_left(mode: str) -> None:
+def test_no_mode_leaves_a_strict_level(mode: str) -> None:
     outcome = solve(Request(served("beverage1", "location7"), mode, leave_levels=False))
     assert outcome.status is Status.GAVE_UP
 
 
-def test_where_a_level_is_left_what_it_asks_and_is_kept_is_not_named() -> None:
+def test_a_plan_that_leaves_a_level_does_not_name_its_satisfied_preconditions() -> None:
     problem = served("no_beverage", "location7")
     outcome = plan_level(problem, 2)
     assert outcome.plan is not None
@@ -103,7 +103,7 @@ def test_where_a_level_is_left_what_it_asks_and_is_kept_is_not_named() -> None:
     assert left.broken == ()
 
 
-def test_a_plan_that_leaves_no_level_has_nothing_to_name() -> None:
+def test_a_plan_that_leaves_no_level_names_no_preconditions() -> None:
     problem = served("no_beverage", "location7")
     outcome = paper(problem)
     assert outcome.plan is not None
@@ -115,7 +115,7 @@ def test_a_plan_that_leaves_no_level_has_nothing_to_name() -> None:
 
 @pytest.mark.parametrize("part", range(4))
 @pytest.mark.parametrize("mode", MODES)
-def test_random_worlds_keep_their_levels_and_the_truth(mode: str, part: int) -> None:
+def test_plans_in_random_worlds_keep_their_levels_and_no_answer_is_wrong(mode: str, part: int) -> None:
     for seed in range(25 * part, 25 * (part + 1)):
         problem = hierarchy(seed)
         outcome = MODES[mode](problem)
@@ -130,7 +130,7 @@ def naively(problem: Problem) -> Callable[[State], Iterable[tuple[float, State]]
     return lambda state: ((b.cost, after) for b in behaviors for _, after in naive.results(problem, b, dict(state)))
 
 
-def test_the_truth_about_random_worlds_is_that_of_the_naive_interpreter() -> None:
+def test_exhaustive_search_in_random_worlds_agrees_with_the_naive_interpreter() -> None:
     small = [problem for problem in map(hierarchy, range(400)) if states(problem) <= 60]
     found = [solvable(problem) for problem in small]
     assert found == [solvable(problem, naively) for problem in small]
@@ -138,7 +138,7 @@ def test_the_truth_about_random_worlds_is_that_of_the_naive_interpreter() -> Non
     assert min(found.count(True), found.count(False)) > 5
 
 
-def test_random_worlds_differ_in_what_the_levels_make_of_them() -> None:
+def test_random_worlds_include_plans_that_keep_levels_and_plans_that_leave_them() -> None:
     problems = list(map(hierarchy, range(100)))
     outcomes = list(map(paper, problems))
     solved = [(p, o) for p, o in zip(problems, outcomes, strict=True) if o.plan is not None]
@@ -153,7 +153,7 @@ def test_random_worlds_differ_in_what_the_levels_make_of_them() -> None:
     assert len(excursions) > 5
 
 
-def test_what_is_wrong_with_an_outcome_is_said() -> None:
+def test_each_kind_of_wrong_outcome_is_reported() -> None:
     problem = hierarchy(0)
     outcome = paper(problem)
     assert outcome.plan is not None
@@ -165,7 +165,7 @@ def test_what_is_wrong_with_an_outcome_is_said() -> None:
     assert "a plan where there is none" in complaints(problem, outcome, outcome, False)
 
 
-def test_steps_of_the_level_below_that_the_level_above_could_have_done_break_nothing() -> None:
+def test_a_refinement_without_its_upper_steps_is_valid_and_violates_no_precondition() -> None:
     compared = 0
     for seed in range(80):
         problem = hierarchy(seed)
@@ -179,7 +179,7 @@ def test_steps_of_the_level_below_that_the_level_above_could_have_done_break_not
     assert compared > 20
 
 
-def test_as_many_states_are_looked_at_as_the_searches_took_work_for() -> None:
+def test_the_number_of_examined_states_grows_with_the_work_of_the_searches() -> None:
     lamps = " ".join(f"lamp{i}" for i in range(13))
     problem = imported(
         parse(
@@ -199,14 +199,14 @@ def test_as_many_states_are_looked_at_as_the_searches_took_work_for() -> None:
         looked_at(task, segments, most)
 
 
-def test_a_shorter_order_brings_about_what_the_first_level_does_not_see_too() -> None:
+def test_a_shorter_order_of_goals_also_achieves_the_goals_that_level_1_does_not_see() -> None:
     problem = hierarchy(4_000_382)  # level 1 doesn't see the goal position of the robot
     outcome = default(problem)
     assert outcome.plan is not None
     assert validate(problem, outcome.plan) == []
 
 
-def test_a_refinement_that_was_found_in_a_state_is_not_searched_there_again() -> None:
+def test_a_refinement_that_was_found_in_a_state_is_not_searched_again_in_this_state() -> None:
     problem = tabletop()
     call = Call(problem, compiled(problem), None, 10_000)
     refiner, first = call.refiner, call.program.levels[0]
@@ -239,7 +239,7 @@ def pen(goal: Mapping[str, str], *, key: bool = True) -> Problem:
     )
 
 
-def test_the_papers_mode_says_which_level_it_left_and_what_that_does_not_know() -> None:
+def test_the_papers_mode_reports_the_left_level_and_the_fact_that_this_level_does_not_know() -> None:
     outcome = paper(pen({"AJAR gate": TRUE}))
     assert outcome.status is Status.SOLVED and outcome.fallbacks == 1
     assert outcome.given_up == (
@@ -247,7 +247,7 @@ def test_the_papers_mode_says_which_level_it_left_and_what_that_does_not_know() 
     )
 
 
-def test_the_papers_mode_doubts_again_and_again_and_then_looks_for_proofs() -> None:
+def test_the_papers_mode_searches_for_proofs_with_growing_limits() -> None:
     asked: list[int] = []
 
     def proof(problem: Problem, states: int, deadline: float | None) -> None:
@@ -259,7 +259,7 @@ def test_the_papers_mode_doubts_again_and_again_and_then_looks_for_proofs() -> N
     assert _proof(pen({"IN lion": "yard"}, key=False), 100, 0.0) is None  # the deadline passed first
 
 
-def test_where_no_state_will_do_it_is_said_how_many_there_are() -> None:
+def test_the_reason_of_an_exhausted_search_states_the_number_of_states() -> None:
     task = ground(
         replace(pen({"IN lion": "yard"}), goal={Symbol("IN", ("lion",)): "yard", Symbol("AJAR", ("gate",)): TRUE}), 2
     )

@@ -23,7 +23,7 @@ CASES = Path(__file__).parent / "cases"
 
 @pytest.mark.parametrize("mode", ["guarded", "optimal"])
 @pytest.mark.parametrize("name", ["h2", "full", "202470", "202991"])
-def test_goals_in_series_notice_what_changed_after_the_steps_were_done_again(name: str, mode: Mode) -> None:
+def test_planning_of_goals_in_series_ends_after_a_replay_of_steps(name: str, mode: Mode) -> None:
     result = confab.load(CASES / f"endless-{name}.ttl").plan(mode=mode)
     assert result.outcome.status is Status.SOLVED
     assert len(result.plan.primitives) == 2
@@ -45,7 +45,7 @@ def test_an_episode_in_which_planning_changes_nothing_gives_up(monkeypatch: pyte
     assert "planned 3 times in the same situation" in episode.reasons[0].text
 
 
-def test_an_episode_ends_within_its_time() -> None:
+def test_an_episode_ends_within_its_time_limit() -> None:
     problem = confab.load(CASES / "execute-without-end" / "isles-mid.ttl").problem
     begin = process_time()
     with within(0.0):
@@ -67,7 +67,7 @@ def test_blocks_of_limits_nest_and_the_earliest_deadline_counts() -> None:
         assert 0.0 < (Limits(seconds=20.0).end(0.5) or 0.0) - perf_counter() <= 5.0
 
 
-def test_a_join_that_would_outlast_the_deadline_is_not_begun() -> None:
+def test_a_join_beyond_the_deadline_is_not_begun() -> None:
     table = JoinTable(1, 4000)
     table.add(np.arange(4000).reshape(-1, 1))
     begin = process_time()
@@ -76,7 +76,7 @@ def test_a_join_that_would_outlast_the_deadline_is_not_begun() -> None:
     assert process_time() - begin < 0.2
 
 
-def test_a_chain_of_needs_may_be_longer_than_the_stack_is_deep() -> None:
+def test_a_chain_of_preconditions_may_be_longer_than_the_stack() -> None:
     """Each lamp needs the lamp before it; the first lamp needs a switch that doesn't exist."""
     lamps = [f"lamp{i}" for i in range(1500)]
     light = behavior(

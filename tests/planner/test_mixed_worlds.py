@@ -25,7 +25,7 @@ from worlds.walking import faults
 SEEDS = range(20)
 
 
-def test_a_seed_is_one_world() -> None:
+def test_a_seed_always_gives_the_same_world() -> None:
     assert all(scene(mixed(seed)) == scene(mixed(seed)) for seed in SEEDS)
 
 
@@ -48,7 +48,7 @@ def test_the_interpreter_agrees_with_the_naive_reading() -> None:
                 assert naive == own, (seed, one.name)
 
 
-def test_a_scene_says_what_was_meant(tmp_path: Path) -> None:
+def test_the_scene_of_a_random_world_has_its_goals_and_reachable_states(tmp_path: Path) -> None:
     """The problem that is read from the file has the same applicable behaviours and reachable states as the drawn world."""
     for seed in SEEDS:
         world = mixed(seed)
@@ -63,7 +63,7 @@ def test_a_scene_says_what_was_meant(tmp_path: Path) -> None:
         assert (said.least, len(said.costs)) == (meant.least, len(meant.costs)), seed
 
 
-def test_a_step_that_is_left_out_is_noticed() -> None:
+def test_the_plain_interpreter_rejects_an_incomplete_plan_and_an_unknown_step() -> None:
     world = next(
         w
         for w in map(mixed, range(100, 200))
@@ -81,7 +81,7 @@ def patiently(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("first", [5_050, 5_100, 5_150, 5_200])
-def test_nothing_is_wrong_in_small_worlds_of_everything(first: int, tmp_path: Path) -> None:
+def test_small_worlds_with_all_constructs_give_no_wrong_answer(first: int, tmp_path: Path) -> None:
     """Every mode, the checker, exports and execution agree with an exhaustive search."""
     wrong = []
     for seed in range(first, first + 50):
@@ -102,13 +102,13 @@ def test_no_mode_refuses_a_division_by_an_amount_that_changes(seed: int, tmp_pat
 
 @pytest.mark.usefixtures("patiently")
 @pytest.mark.parametrize("seed", [200_002_806, 200_004_245])
-def test_few_states_are_certified_where_telling_fewer_values_apart_has_no_end(seed: int, tmp_path: Path) -> None:
+def test_a_world_with_few_states_is_certified_by_its_states(seed: int, tmp_path: Path) -> None:
     its = Judge(mixed(seed, 0.0), tmp_path, every=True).judged()
     assert not its.complaints
     assert {its.status[mode] for mode in ("guarded", "optimal", "paper")} == {"unsolvable"}
 
 
-def test_what_has_a_default_value_is_found_though_nothing_states_it(tmp_path: Path) -> None:
+def test_a_fact_with_a_default_value_is_found_although_the_scene_does_not_state_it(tmp_path: Path) -> None:
     """A fact of two objects with the default value isn't stated.
 
     So neither object leads to the other, and all members of the class are tried.
@@ -124,7 +124,7 @@ def test_a_rule_about_an_object_that_is_its_own_value_is_learned(tmp_path: Path)
 
 
 @pytest.mark.parametrize("seed", [202_002_963, 202_003_161])
-def test_no_level_is_left_to_bring_the_beginning_to_rest_where_levels_are_strict(seed: int, tmp_path: Path) -> None:
+def test_no_strict_level_is_left_to_bring_initial_values_to_rest(seed: int, tmp_path: Path) -> None:
     assert not Judge(mixed(seed, 0.0), tmp_path, every=True).judged().complaints
 
 
@@ -137,7 +137,7 @@ def test_a_count_follows_values_that_a_witness_loses(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("seed", [320_002_517, 320_002_585])
-def test_a_count_that_takes_too_many_conditions_is_refused_at_once(seed: int, tmp_path: Path) -> None:
+def test_a_count_with_too_many_conditions_is_refused_immediately(seed: int, tmp_path: Path) -> None:
     (tmp_path / "world.ttl").write_text(scene(mixed(seed)))
     world, begin = load(str(tmp_path / "world.ttl")), process_time()
     with pytest.raises(KnowledgeError, match="by too many effects at once; use fewer effects"):
@@ -146,7 +146,7 @@ def test_a_count_that_takes_too_many_conditions_is_refused_at_once(seed: int, tm
 
 
 @pytest.mark.parametrize("seed", [340_028_395])
-def test_a_step_is_not_held_to_totals_that_its_level_does_not_see(seed: int, tmp_path: Path) -> None:
+def test_a_step_need_not_keep_totals_that_its_level_does_not_see(seed: int, tmp_path: Path) -> None:
     assert not Judge(mixed(seed), tmp_path, every=True).judged().complaints
 
 
@@ -174,7 +174,7 @@ def test_a_total_counts_individuals_that_the_task_does_not_need(seed: int, tmp_p
     assert not Judge(mixed(seed), tmp_path, every=True).judged().complaints
 
 
-def test_a_step_that_cannot_be_refined_is_no_error_where_a_plan_may_leave_its_level(tmp_path: Path) -> None:
+def test_a_step_without_refinement_is_no_error_if_the_plan_may_leave_its_level(tmp_path: Path) -> None:
     """The default mode leaves the level; modes that keep all levels give up and name the step."""
     its = Judge(mixed(340_007_688), tmp_path, every=True).judged()
     assert not its.complaints
@@ -193,7 +193,7 @@ def test_a_search_that_ends_too_early_is_no_error_of_the_domain(limit: float, tm
     assert outcome.status is Status.GAVE_UP
 
 
-def test_failing_conditions_without_common_variables_are_found_one_by_one(
+def test_failing_conditions_without_common_variables_are_tested_one_by_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A step has a hundred effects with eighteen conditions each; combinations of conditions would need 77,000 tests."""

@@ -122,7 +122,7 @@ def otherwise(problem: Problem) -> set[str]:
 
 @given(seed=st.integers(0, 10**9))
 @settings(max_examples=settings().max_examples * 3)
-def test_every_evaluator_agrees_on_what_is_applicable_and_what_comes_of_it(seed: int) -> None:
+def test_all_evaluators_agree_on_applicable_behaviours_and_their_effects(seed: int) -> None:
     assert otherwise(language(seed, defined=seed % 2 == 1)) == set()
 
 
@@ -138,7 +138,7 @@ def true_first(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("true_first")
-def test_effects_in_the_wrong_order_are_noticed() -> None:
+def test_a_wrong_order_of_effects_is_detected() -> None:
     noticed, seed = set[str](), 0
     while len(noticed) < 3 and seed < 200:
         noticed |= otherwise(language(seed))
@@ -148,7 +148,7 @@ def test_effects_in_the_wrong_order_are_noticed() -> None:
 
 @pytest.mark.usefixtures("true_first")
 @pytest.mark.parametrize("mode", ["guarded", "paper"])
-def test_a_plan_that_rests_on_them_never_leaves(mode: str) -> None:
+def test_a_plan_that_relies_on_a_wrong_order_of_effects_is_rejected(mode: str) -> None:
     driven = small.drive().problem
     assert solve(Request(driven, mode)).plan is None  # although there is a plan
     away = replace(driven, goal={Symbol("THERE", ("truck", "yard")): FALSE})
@@ -158,7 +158,7 @@ def test_a_plan_that_rests_on_them_never_leaves(mode: str) -> None:
 
 @given(world=worlds())
 @settings(max_examples=max(settings().max_examples // 2, 30))
-def test_queries_on_the_graph_say_so_too(world: str) -> None:
+def test_queries_on_the_graph_agree_with_all_evaluators(world: str) -> None:
     with TemporaryDirectory() as folder:
         graph = graph_of(world, Path(folder))
     reading = read(graph)
@@ -189,7 +189,7 @@ def forgotten(source: str, function: str, kinds: set[str]) -> set[str]:
 
 
 @pytest.mark.parametrize(("path", "function"), CASES.items())
-def test_no_evaluator_forgets_a_kind_of_condition(path: str, function: str) -> None:
+def test_every_evaluator_handles_every_kind_of_condition(path: str, function: str) -> None:
     kinds = set(re.findall(r"\w+", str(vars(symbols)["Condition"])))
     source = (ROOT / path).read_text(encoding="utf-8")
     assert len(kinds) >= 6

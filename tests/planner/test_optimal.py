@@ -54,7 +54,7 @@ def test_a_plan_is_optimal_when_its_cost_is_the_bound() -> None:
     assert validate(problem, outcome.plan) == []
 
 
-def test_when_time_runs_out_there_is_a_plan_and_a_bound_below_it() -> None:
+def test_the_optimal_mode_returns_a_plan_and_a_lower_bound_at_its_time_limit() -> None:
     problem = family("served", 6)
     outcome = optimal.plan(problem, limits=Limits(seconds=3.0))
     assert outcome.status is Status.SOLVED
@@ -64,7 +64,7 @@ def test_when_time_runs_out_there_is_a_plan_and_a_bound_below_it() -> None:
     assert outcome.seconds < 3.0 * 1.1 + 0.5
 
 
-def test_a_shorter_plan_that_leaves_a_hand_lowered_is_none() -> None:
+def test_a_shorter_plan_that_leaves_a_hand_lowered_is_not_accepted() -> None:
     problem = family("served", 2, hands=1)
     outcome = solve(Request(problem, "optimal"))
     assert outcome.plan is not None
@@ -74,7 +74,7 @@ def test_a_shorter_plan_that_leaves_a_hand_lowered_is_none() -> None:
     assert shortest(task).bound < outcome.bound, "the world has no such plan; choose another"
 
 
-def test_the_bound_holds_where_something_not_at_rest_need_not_be_touched() -> None:
+def test_the_bound_is_correct_if_a_variable_that_is_not_at_rest_need_not_change() -> None:
     problem = family("served", 2, hands=1)
     lowered = {s: "location4" for s in problem.initial if s.situation == "HAND_POSITION"}
     problem = replace(problem, initial={**problem.initial, **lowered})
@@ -84,7 +84,7 @@ def test_the_bound_holds_where_something_not_at_rest_need_not_be_touched() -> No
     assert outcome.bound <= cost_of(problem, outcome.plan)
 
 
-def test_what_is_true_or_false_and_not_stated_is_at_rest_in_the_end_of_a_best_plan() -> None:
+def test_an_unstated_boolean_fact_is_at_rest_at_the_end_of_an_optimal_plan() -> None:
     ajar = SituationType("AJAR", ("Gate",), "Truth", 2, FALSE, FALSE, True)
     within = SituationType("IN", ("Animal",), "IN")
     problem = world(

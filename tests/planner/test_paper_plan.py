@@ -63,7 +63,7 @@ def test_the_numbering_has_48_32_and_34_behaviours_from_declared_order() -> None
     assert numbers == {1: list(range(48)), 2: list(range(32)), 3: list(range(4, 38))}
 
 
-def test_it_takes_at_most_200_expansions_in_all() -> None:
+def test_planning_of_the_papers_task_needs_at_most_200_expansions() -> None:
     outcome = plan(problem("beverage-serving"))
     assert sum(counts.expanded for counts in outcome.search.values()) <= 200
 
@@ -77,7 +77,7 @@ def test_one_demonstration_teaches_its_order(order: tuple[int, ...], deep: bool)
     assert tuple(step.id for step in solved(serving, learn(serving, shown, Links())).steps) == order
 
 
-def test_without_memory_the_order_of_the_figure_does_not_come_out_by_itself() -> None:
+def test_planning_without_memory_does_not_give_the_order_of_the_figure() -> None:
     # Otherwise the test above would not test confabulation.
     assert tuple(step.id for step in solved(problem("beverage-serving")).steps) != (22, 34, 28, 39)
 

@@ -45,7 +45,7 @@ def optimal(problem: Problem) -> Outcome:
     return solve(Request(problem, "optimal", Limits(seconds=20.0)))
 
 
-def test_a_goal_that_costs_more_than_its_weight_is_left_unmet_and_said_with_its_price() -> None:
+def test_a_goal_that_costs_more_than_its_weight_is_left_unmet_and_reported_with_its_price() -> None:
     result = confab.load("wishes-small").plan()
     assert [str(one.fact) for one in result.outcome.forgone] == ["store STOCK 0"]
     (one,) = result.outcome.forgone
@@ -54,7 +54,7 @@ def test_a_goal_that_costs_more_than_its_weight_is_left_unmet_and_said_with_its_
     assert not result.faults(result.plan)
 
 
-def test_all_soft_goals_are_met_where_they_are_worth_it(tmp_path: Path) -> None:
+def test_all_soft_goals_are_met_if_their_weights_exceed_their_costs(tmp_path: Path) -> None:
     shop = confab.load(written(tmp_path, "c:weight 8.0", "c:weight 500.0"))
     result = shop.plan()
     assert result.outcome.forgone == ()
@@ -70,7 +70,7 @@ def test_a_soft_goal_that_cannot_be_met_is_left_and_a_hard_one_makes_the_task_un
     assert hard.status is Status.UNSOLVABLE
 
 
-def test_a_proof_that_gives_up_leaves_the_choice_of_the_default_search() -> None:
+def test_the_choice_of_soft_goals_is_kept_if_its_proof_gives_up() -> None:
     problem = confab.load("wishes-small").problem
     chosen, outcome = preferred(problem, default)
     same, unproved = preferred(problem, default, lambda task: Outcome(Status.GAVE_UP))
@@ -83,7 +83,7 @@ def test_a_goal_that_a_user_gives_has_to_be_met() -> None:
     assert "store STOCK 0" not in [str(one.fact) for one in result.outcome.forgone]
 
 
-def test_command_line_and_json_say_what_is_left() -> None:
+def test_the_command_line_and_json_name_the_unmet_soft_goals() -> None:
     said = CliRunner().invoke(app, ["plan", "wishes-small"]).output
     assert "leaves a soft goal unmet: store STOCK 0 (weight 8; it would cost at most " in said
     data = json.loads(CliRunner().invoke(app, ["plan", "wishes-small", "--json"]).stdout)
@@ -155,7 +155,7 @@ def test_soft_goals_are_preferences_of_pddl_both_ways(tmp_path: Path) -> None:
     assert results[0].cost == results[1].cost == 23.0
 
 
-def test_a_preference_that_is_no_fact_is_refused_by_name() -> None:
+def test_a_preference_that_is_not_a_single_fact_is_refused_by_name() -> None:
     domain = "(define (domain d) (:predicates (p ?x) (q ?x)) (:action a :parameters (?x) :effect (and (p ?x) (q ?x))))"
     problem = "(define (problem x) (:domain d) (:objects o) (:init) (:goal (preference both (and (p o) (q o)))))"
     with pytest.raises(PddlError, match="preference 'both': only preferences of one fact"):
@@ -170,7 +170,7 @@ def test_a_brief_call_with_a_time_limit_leaves_the_first_plan_as_it_is() -> None
     assert solve(Request(problem, limits=Limits(seconds=1.0, shortening="repeated"))).saving is not None
 
 
-def test_the_chosen_soft_goals_get_the_full_work_and_the_comparison_of_choices_little() -> None:
+def test_limited_work_for_comparing_choices_of_soft_goals_gives_the_same_total_cost() -> None:
     """The total cost is the same as if the planner spent the full work on every choice."""
     scene = confab.load("wishes-small")
     result = scene.plan()

@@ -97,7 +97,7 @@ def test_the_missing_relation_at_the_end_of_the_chain_is_named() -> None:
     )
 
 
-def test_of_several_behaviours_what_one_of_them_lacks_is_told() -> None:
+def test_the_reason_names_the_missing_fact_of_one_of_several_behaviours() -> None:
     throw = behavior(
         "THROW", 1, "?c:Cup ?p:Place", [RelationCondition("fits", ("?c", "?p"))], [becomes("AT", "?c", "?p")]
     )
@@ -106,14 +106,14 @@ def test_of_several_behaviours_what_one_of_them_lacks_is_told() -> None:
     assert why(kitchen({"AT cup1": "sink"}, [], [PUT, throw])) == ""
 
 
-def test_what_a_behaviour_lacks_is_named_and_nothing_else() -> None:
+def test_the_reason_names_only_the_missing_fact_of_a_behaviour() -> None:
     both = [REACH, RelationCondition("fits", ("?c", "?p")), RelationCondition("fits", ("cup1", "shelf"), True)]
     place = behavior("PLACE", 1, "?h:Hand ?c:Cup ?p:Place", both, [becomes("AT", "?c", "?p")])
     said = "cup2 AT sink can't be reached: PLACE requires cup2 fits sink, which does not hold"
     assert why(kitchen({"AT cup2": "sink"}, behaviors=[place])) == said
 
 
-def test_what_is_about_two_individuals_is_followed_too() -> None:
+def test_a_reason_includes_missing_facts_about_two_individuals() -> None:
     near = SituationType("NEAR", ("Cup", "Place"), "Truth", boolean=True)
     bring = behavior("BRING", 1, "?h:Hand ?c:Cup ?p:Place", [REACH], [becomes("NEAR", "?c", "?p", TRUE)])
     wipe = behavior("WIPE", 1, "?c:Cup", [has("NEAR", "?c", "attic", TRUE)], [becomes("CLEAN", "?c", TRUE)])
@@ -127,7 +127,7 @@ def test_what_is_about_two_individuals_is_followed_too() -> None:
     assert why(reaching) == ""
 
 
-def test_preconditions_that_no_state_has_both_are_named_together() -> None:
+def test_two_preconditions_that_no_state_satisfies_are_named_together() -> None:
     never = behavior(
         "RINSE", 1, "?c:Cup", [has("CLEAN", "?c", FALSE), has("CLEAN", "?c", TRUE)], [becomes("CLEAN", "?c", TRUE)]
     )
@@ -136,7 +136,7 @@ def test_preconditions_that_no_state_has_both_are_named_together() -> None:
     )
 
 
-def test_what_nothing_brings_about_is_said_so() -> None:
+def test_a_goal_that_no_behaviour_achieves_is_reported() -> None:
     assert why(kitchen({"DRY cup1": TRUE}, behaviors=[PUT, WASH])) == (
         "cup1 DRY true can't be reached: no behaviour of level 1 has this effect"
     )
@@ -149,14 +149,14 @@ def test_what_nothing_brings_about_is_said_so() -> None:
     "goal",
     [{"AT cup1": "sink"}, {"AT cup1": "shelf"}, {"CLEAN cup1": FALSE}, {"DRY cup1": TRUE, "AT cup2": "sink"}, {}],
 )
-def test_nothing_is_said_where_there_is_a_plan(goal: dict[str, str]) -> None:
+def test_a_task_with_a_plan_has_no_reason_for_unsolvable(goal: dict[str, str]) -> None:
     problem = kitchen(goal)
     assert solvable(problem)
     assert impossible(problem) is None
     assert isinstance(proved(problem, 1), Task)
 
 
-def test_what_needs_itself_is_a_proof_and_what_may_be_so_is_none() -> None:
+def test_a_circular_precondition_is_a_proof_and_an_achievable_one_is_none() -> None:
     swap = behavior("SWAP", 1, "?c:Cup", [has("DRY", "?c", TRUE)], [becomes("CLEAN", "?c", TRUE)])
     back = behavior("BACK", 1, "?c:Cup", [has("CLEAN", "?c", TRUE)], [becomes("DRY", "?c", TRUE)])
     assert "can't be reached" in why(kitchen({"CLEAN cup1": TRUE}, behaviors=[swap, back]))
@@ -184,7 +184,7 @@ TWO = behavior("TWO", 1, "?c:Cup ?d:Cup ?p:Place", [NOBODY], [becomes("AT", "?c"
 
 
 @pytest.mark.parametrize("more", [HEAP, OF_TRAYS, SOMEBODY, ELSEWHERE, DROP, TWO])
-def test_goals_exclude_each_other_only_where_every_behaviour_asks_that_nobody_is_there(more: Behavior) -> None:
+def test_goals_exclude_each_other_only_if_every_achiever_requires_a_free_place(more: Behavior) -> None:
     both = {"AT cup1": "sink", "AT cup2": "sink"}
     problem = kitchen(both, behaviors=[PUT, replace(more, name="MORE")])
     assert bool(why(problem)) == (not solvable(problem))
@@ -192,13 +192,13 @@ def test_goals_exclude_each_other_only_where_every_behaviour_asks_that_nobody_is
     assert why(kitchen(on_the_shelf, initial=on_the_shelf)) == ""
 
 
-def test_who_asks_that_nobody_of_a_wider_kind_is_there_asks_enough() -> None:
+def test_a_condition_that_no_object_of_a_wider_class_is_there_is_strong_enough() -> None:
     anybody = replace(PUT, preconditions=(*HEAP.preconditions, replace(NOBODY, kind="Thing")))
     problem = kitchen({"AT cup1": "sink", "AT cup2": "sink"}, behaviors=[anybody])
     assert "exclude" in why(replace(problem, classes={**problem.classes, "Thing": ("cup1", "cup2", "tray")}))
 
 
-def test_a_behaviour_that_puts_things_elsewhere_lets_goals_exclude_each_other() -> None:
+def test_goals_exclude_each_other_although_a_behaviour_moves_objects_elsewhere() -> None:
     aside = behavior("ASIDE", 1, "?c:Cup", [], [becomes("AT", "?c", "attic")])
     nowhere = behavior("TRAY", 1, "?c:Cup ?t:Tray", [], [becomes("AT", "?c", "?t")])
     assert "exclude each other" in why(kitchen({"AT cup1": "sink", "AT cup2": "sink"}, behaviors=[PUT, aside, nowhere]))
@@ -228,7 +228,7 @@ def test_the_cause_at_the_end_of_a_chain_comes_first() -> None:
     )
 
 
-def test_who_moves_something_else_is_not_the_reason() -> None:
+def test_a_behaviour_that_moves_another_kind_of_object_is_not_the_reason() -> None:
     """Maids walk, and trolleys are pushed: the behaviour by which maids walk isn't the reason why no trolley reaches the attic."""
     at = SituationType("AT", ("Mobile",), "Place")
     from_here = RelationCondition("path", ("?from", "?to"))
@@ -260,7 +260,7 @@ def reason(conditions: Iterable[object], terms: str = "?c:Cup ?p:Place ?h:Hand")
     return said.partition("can't be reached: ")[2].removeprefix("MAKE requires ").partition(", and there")[0]
 
 
-def test_what_fails_to_hold_is_said_as_people_would() -> None:
+def test_failing_conditions_are_written_as_readable_sentences() -> None:
     assert reason([ClassCondition("?c", "Tray")]) == "that cup2 is a Tray, but cup2 isn't"
     assert reason([RelationCondition("canReach", ("?h", "?p"))]) == "a Hand that canReach sink"
     assert reason([RelationCondition("fits", ("?c", "?q"))], "?c:Cup ?p:Place ?q:Place") == "a Place that cup2 fits"
@@ -273,7 +273,7 @@ def test_what_fails_to_hold_is_said_as_people_would() -> None:
     )
 
 
-def test_what_no_level_knows_or_no_behaviour_makes_is_said_so() -> None:
+def test_a_goal_on_an_unknown_fact_or_without_an_achiever_is_reported() -> None:
     assert why(kitchen({"AT tray": "sink"})) == ("tray AT sink can't be reached: there is no <tray, AT> on level 1")
     assert why(kitchen({"CLEAN cup1": TRUE}, behaviors=[PUT])) == (
         "cup1 CLEAN true can't be reached: no behaviour of level 1 has this effect"
@@ -281,7 +281,7 @@ def test_what_no_level_knows_or_no_behaviour_makes_is_said_so() -> None:
     assert why(kitchen({"AT cup1": "left"})).endswith("no behaviour of level 1 has this effect")
 
 
-def test_the_reason_with_the_fewest_parts_is_told() -> None:
+def test_the_reason_with_the_fewest_parts_is_given() -> None:
     hard = behavior("A_HARD", 1, "?c:Cup ?h:Hand ?q:Place",
                     [RelationCondition("canReach", ("?h", "?q")), RelationCondition("fits", ("cup1", "?q"))],
                     [becomes("AT", "?c", "sink")])  # fmt: skip
@@ -289,20 +289,20 @@ def test_the_reason_with_the_fewest_parts_is_told() -> None:
     assert said == "cup2 AT sink can't be reached: PUT requires a Hand that canReach sink, and there is none"
 
 
-def test_a_circle_of_reasons_ends() -> None:
+def test_a_circular_chain_of_reasons_ends() -> None:
     swap = behavior("SWAP", 1, "?c:Cup", [has("DRY", "?c", TRUE)], [becomes("CLEAN", "?c", TRUE)])
     assert why(kitchen({"CLEAN cup1": TRUE}, behaviors=[swap, DRY])) == (
         "cup1 CLEAN true can't be reached: SWAP requires cup1 DRY true, which never holds"
     )
 
 
-def test_a_fact_that_would_have_to_end_is_told() -> None:
+def test_a_fact_that_would_have_to_end_is_reported() -> None:
     stay = behavior("MOVE", 1, "?c:Cup ?p:Place", [lacks("AT", "?c", "shelf")], [becomes("AT", "?c", "?p")])
     said = why(kitchen({"AT cup1": "sink"}, behaviors=[stay]))
     assert said == "cup1 AT sink can't be reached: MOVE requires not cup1 AT shelf, which never holds"
 
 
-def test_what_can_come_about_is_not_among_what_is_missing() -> None:
+def test_an_achievable_fact_is_not_listed_as_missing() -> None:
     rinse = behavior("RINSE", 1, "?c:Cup", [has("CLEAN", "?c", FALSE)], [becomes("CLEAN", "?c", TRUE)])
     air = behavior(
         "AIR", 1, "?c:Cup", [has("CLEAN", "?c", TRUE), lacks("AT", "?c", "shelf")], [becomes("DRY", "?c", TRUE)]
@@ -312,7 +312,7 @@ def test_what_can_come_about_is_not_among_what_is_missing() -> None:
     assert said == "cup1 DRY true can't be reached: AIR requires not cup1 AT shelf, which never holds"
 
 
-def test_other_values_are_no_way_to_the_one_that_is_wanted() -> None:
+def test_a_behaviour_that_sets_another_value_is_no_achiever_of_the_goal() -> None:
     for there in ("sink", "attic"):
         drop = behavior("DROP", 1, "?c:Cup", [], [becomes("AT", "?c", there)])
         for wanted in {"sink", "attic", "table"} - {there}:
@@ -320,7 +320,7 @@ def test_other_values_are_no_way_to_the_one_that_is_wanted() -> None:
             assert said == f"cup1 AT {wanted} can't be reached: no behaviour of level 1 has this effect"
 
 
-def test_conditions_that_hold_one_by_one_but_never_together_are_told_together() -> None:
+def test_conditions_that_hold_singly_but_never_together_are_named_together() -> None:
     both = [has("CLEAN", "?x", TRUE), has("DRY", "?x", TRUE)]
     use = behavior("USE", 1, "?c:Cup ?x:Cup", both, [becomes("AT", "?c", "sink")])
     state = {"AT cup1": "shelf", "AT cup2": "table", "CLEAN cup1": TRUE, "DRY cup2": TRUE}
@@ -332,7 +332,7 @@ def test_conditions_that_hold_one_by_one_but_never_together_are_told_together() 
     )
 
 
-def test_of_several_reasons_one_that_never_changes_is_told() -> None:
+def test_a_static_reason_is_preferred_to_other_reasons() -> None:
     dirty = has("CLEAN", "?c", TRUE)
     assert reason([dirty, RelationCondition("fits", ("?c", "?p"))]) == "cup2 fits sink, which does not hold"
     assert reason([ClassCondition("?c", "Tray"), dirty]) == "that cup2 is a Tray, but cup2 isn't"
@@ -352,7 +352,7 @@ def lamps(many: int, last: str = "") -> str:
     return why(replace(problem, domain=replace(problem.domain, situations=situations)))
 
 
-def test_a_long_chain_of_reasons_is_cut_and_what_needs_itself_is_told_once() -> None:
+def test_a_long_chain_of_reasons_is_cut_and_a_circular_reason_is_given_once() -> None:
     cause = "can't be reached: LIGHT0 requires cup1 CLEAN true, which does not hold; so"
     assert lamps(3) == f"cup1 L2 true {cause} cup1 L0 true and cup1 L1 true never hold"
     assert (
@@ -393,7 +393,7 @@ def test_a_level_for_which_memory_runs_out_proves_nothing(monkeypatch: pytest.Mo
     assert proved(kitchen({"AT cup1": "sink"}), 1) == OUT_OF_MEMORY
 
 
-def test_all_states_are_looked_at_only_within_bounds_and_never_twice() -> None:
+def test_states_are_examined_only_within_bounds_and_not_repeatedly() -> None:
     problem = kitchen({"AT cup1": "sink", "CLEAN cup1": TRUE, "DRY cup2": TRUE, "AT cup2": "shelf"})
     task = ground(problem, 1)
     assert isinstance(task, Task)
@@ -418,7 +418,7 @@ def test_all_states_are_looked_at_only_within_bounds_and_never_twice() -> None:
 
 
 @pytest.mark.parametrize("part", range(2))
-def test_no_proof_is_wrong_in_random_worlds_and_many_are_found(part: int) -> None:
+def test_the_expected_number_of_proofs_is_found_in_random_worlds(part: int) -> None:
     said = [why(hierarchy(seed)) for seed in range(40 * part, 40 * (part + 1))]
     assert sum(map(bool, said)) == FOUND[part]
 
@@ -457,7 +457,7 @@ NO_ATTIC = "PUT requires a Hand that canReach attic, and there is none; so cup1 
         ((so_many(2, "CLEAN"), ATTIC), NO_ATTIC),
     ],
 )
-def test_what_counts_says_how_many_there_can_be_and_parts_of_rules_have_no_names(
+def test_the_reason_on_a_counting_rule_states_the_possible_number_and_no_internal_names(
     rule: tuple[Condition, ...], why_not: str
 ) -> None:
     dry1 = behavior("DRY", 1, "", [has("CLEAN", "cup1", TRUE)], [becomes("DRY", "cup1", TRUE)])

@@ -112,7 +112,7 @@ def test_every_step_of_a_joint_refinement_is_explained_and_named() -> None:
     assert [row["behavior"] for row in plan.to_records()].count("L1_BRING") == 3
 
 
-def test_an_intervention_within_a_joint_refinement_is_recovered_from() -> None:
+def test_execution_recovers_from_an_intervention_within_a_joint_refinement() -> None:
     run = library().execute(plan=tour(), interventions="after=0.4 atlas BOOK_AT shelf_b")
     assert run.reached
     assert run.episode.replans
@@ -126,7 +126,7 @@ def test_a_joint_refinement_teaches_its_steps_and_no_method() -> None:
     assert again.plan.length[2] == 10
 
 
-def test_longer_tours_are_as_many_as_the_cart_needs() -> None:
+def test_a_large_library_needs_no_more_tours_than_the_capacity_of_the_cart_requires() -> None:
     plan = confab.load("library-large").plan().plan
     assert plan.length[1] == 12
     assert plan.length[2] <= 45

@@ -59,7 +59,7 @@ def location(individual: str) -> Symbol:
 
 
 @pytest.mark.parametrize("changes", [{}, {location("bottle1"): "location8"}, {location("cup1"): "location7"}])
-def test_what_comes_out_leads_to_the_goal_from_the_situation_as_it_is(changes: State) -> None:
+def test_a_repaired_plan_leads_from_the_present_situation_to_the_goal(changes: State) -> None:
     now = replace(serving(), initial={**serving().initial, **changes})
     repaired = repair_or_replan(now, planned().steps, serving(), using=using())
     assert repaired.steps is not None
@@ -67,7 +67,7 @@ def test_what_comes_out_leads_to_the_goal_from_the_situation_as_it_is(changes: S
     assert all(end[symbol] == value for symbol, value in now.goal.items())
 
 
-def test_where_nothing_that_matters_has_changed_nothing_changes() -> None:
+def test_a_repair_without_relevant_changes_keeps_the_plan() -> None:
     repaired = repair_or_replan(serving(), planned().steps, serving(), using=using())
     assert repaired.steps is not None
     assert repaired.steps == planned().steps
@@ -79,14 +79,14 @@ def test_where_nothing_that_matters_has_changed_nothing_changes() -> None:
         assert [(str(step), step.bindings) for step in found] == [(str(step), step.bindings) for step in left]
 
 
-def test_what_somebody_else_has_done_is_dropped_and_no_more() -> None:
+def test_a_repair_drops_exactly_the_steps_that_a_person_has_done() -> None:
     now = replace(serving(), initial={**serving().initial, location("cup1"): "location7"})
     repaired = repair_or_replan(now, planned().steps, serving(), using=using())
     assert repaired.steps is not None
     assert difference(planned().steps, repaired.steps) == (6, 0)
 
 
-def test_another_place_is_gone_to_in_place_of_the_old_one() -> None:
+def test_a_repair_replaces_the_old_place_by_the_new_goal_place() -> None:
     now = replace(serving(), goal={**serving().goal, location("cup2"): "location6"})
     repaired = repair_or_replan(now, planned().steps, serving(), using=using())
     assert repaired.steps is not None
@@ -94,7 +94,7 @@ def test_another_place_is_gone_to_in_place_of_the_old_one() -> None:
     assert sum(difference(planned().steps, repaired.steps)) < 14
 
 
-def test_it_costs_at_most_a_tenth_more_than_replanning() -> None:
+def test_a_repaired_plan_costs_at_most_slightly_more_than_a_new_plan() -> None:
     for place in ("location6", "location8"):
         for individual in ("cup1", "cup2", "bottle1"):
             now = replace(serving(), goal={**serving().goal, location(individual): place})
@@ -105,21 +105,21 @@ def test_it_costs_at_most_a_tenth_more_than_replanning() -> None:
                 assert repaired.cost <= CLOSE * cost_of(now, Plan(scratch))
 
 
-def test_what_is_not_there_is_named() -> None:
+def test_the_reason_names_a_removed_object() -> None:
     gone = {symbol: value for symbol, value in serving().initial.items() if symbol.arguments != ("cup2",)}
     reasons = vanished(replace(serving(), initial=gone))
     assert [symbol.arguments for symbol, _ in reasons] == [("cup2",), ("cup2",)]
     assert all("cup2" in reason.terms for _, reason in reasons)
 
 
-def test_done_in_another_order_counts_as_dropped_and_added() -> None:
+def test_steps_in_another_order_count_as_dropped_and_added() -> None:
     first, second, *others = planned().steps
     assert sum(difference(planned().steps, (second, first, *others))) == 12
     assert difference((first, second), planned().steps) == (0, sum(len(Plan((step,)).primitives) for step in others))
     assert difference(planned().steps, ()) == (len(planned().primitives), 0)
 
 
-def test_steps_that_the_checker_rejects_are_not_followed() -> None:
+def test_steps_that_the_checker_rejects_have_a_reason_for_rejection() -> None:
     problem = tabletop()
     outcome = plan(problem)
     assert outcome.plan is not None
@@ -128,7 +128,7 @@ def test_steps_that_the_checker_rejects_are_not_followed() -> None:
     assert rejected(problem, outcome.plan.steps[0].steps[1:]) is not None
 
 
-def test_who_is_touched_by_a_change_is_named_by_it_before_or_after() -> None:
+def test_changed_individuals_are_all_individuals_in_changed_facts_and_goals() -> None:
     now = replace(
         serving(),
         initial={
@@ -148,7 +148,7 @@ def test_who_is_touched_by_a_change_is_named_by_it_before_or_after() -> None:
     assert changed_individuals(serving(), serving()) == set()
 
 
-def test_a_step_that_is_under_way_is_finished_unless_it_may_not_be() -> None:
+def test_a_step_in_progress_is_finished_unless_this_is_not_allowed() -> None:
     first, *others = planned().steps
     pick, place = first.steps
     begun = replace(serving(), initial=carried_out(serving(), serving().initial, (pick,)))
@@ -164,7 +164,7 @@ def test_a_step_that_is_under_way_is_finished_unless_it_may_not_be() -> None:
     assert repaired.cost == cost_of(begun, Plan(repaired.steps))
 
 
-def test_a_limit_of_time_is_kept_to() -> None:
+def test_a_repair_ends_at_its_time_limit() -> None:
     now = replace(serving(), initial={**serving().initial, location("cup1"): "location7"})
     late = repair_or_replan(now, planned().steps, serving(), using=using(), limits=Limits(seconds=-1.0))
     assert late.steps is None
@@ -210,7 +210,7 @@ def in_the_hand(done: int, goal: State | None = None) -> tuple[Problem, tuple[St
     return replace(now, goal=goal or now.goal), tuple(rest_after(planned(), done))
 
 
-def test_what_a_hand_holds_goes_where_it_is_wanted_also_where_nothing_is_left_of_the_plan() -> None:
+def test_a_held_object_is_brought_to_its_goal_even_if_no_step_of_the_plan_is_left() -> None:
     now, rest = in_the_hand(3)
     for left in ((), rest[1:]):
         repaired = repair_or_replan(now, left, now, using=using(), in_progress=False)
@@ -220,7 +220,7 @@ def test_what_a_hand_holds_goes_where_it_is_wanted_also_where_nothing_is_left_of
         assert repaired.cost == cost_of(now, Plan(rest))
 
 
-def test_a_step_that_has_begun_is_finished_although_its_domain_knows_no_rest() -> None:
+def test_a_begun_step_is_finished_even_if_the_domain_has_no_rest_values() -> None:
     """A carried object is at no spot, so bringing it isn't applicable any more.
 
     Yet the step is finished, and nothing is put down.
@@ -241,7 +241,7 @@ def test_a_step_that_has_begun_is_finished_although_its_domain_knows_no_rest() -
     assert difference(rest, repaired.steps) == (0, 0)
 
 
-def test_what_is_in_progress_is_not_finished_if_nobody_wants_it_any_more() -> None:
+def test_a_step_in_progress_is_not_finished_if_no_goal_requires_it_any_more() -> None:
     goal = {s: v for s, v in serving().goal.items() if s.arguments != ("cup1",)}
     now, rest = in_the_hand(3, goal=goal)
     assert rest[0].arguments[0] == "cup1"
@@ -254,7 +254,7 @@ def test_what_is_in_progress_is_not_finished_if_nobody_wants_it_any_more() -> No
     assert repaired.cost <= others + cost_of(serving(), Plan(rest[:1]))
 
 
-def test_what_was_undone_is_done_again_first_and_what_was_planned_stays() -> None:
+def test_undone_steps_are_repeated_first_and_the_planned_steps_are_kept() -> None:
     done = len(Plan(planned().steps[:2]).primitives)
     assert {step.arguments[0] for step in planned().steps[:2]} == {"cup1", "cup2"}
     now, rest = in_the_hand(done)
@@ -300,7 +300,7 @@ def after_somebody(problem: Problem, draw: random.Random) -> Problem:
         ("blocked", 5, 24, 23, 520, 64, 11),
     ],
 )
-def test_whatever_happens_whenever_little_is_done_otherwise(
+def test_repairs_after_random_interruptions_change_few_steps(
     name: str, n: int, many: int, kept: int, cost: float, changed: int, asked: int
 ) -> None:
     """Of `many` interruptions, at least `kept` are repaired.

@@ -102,7 +102,7 @@ def foreign() -> Memory:
     return Memory(experience)
 
 
-def test_five_rules_are_learned_of_a_ferry_and_lead_to_every_goal_of_a_hundred_cars(tmp_path: Path) -> None:
+def test_five_rules_learned_from_small_ferries_plan_for_a_hundred_cars_without_search(tmp_path: Path) -> None:
     experience = Experience("robot")
     for cars, places in ((1, 3), (2, 4), (3, 3)):
         teach(experience, ferry(tmp_path, cars, places))
@@ -115,7 +115,7 @@ def test_five_rules_are_learned_of_a_ferry_and_lead_to_every_goal_of_a_hundred_c
     assert expanded(outcome) == len(outcome.plan.steps)
 
 
-def test_what_several_goals_need_is_gathered_first_where_nobody_can_go_back(tmp_path: Path) -> None:
+def test_objects_that_several_goals_need_are_gathered_first_on_a_one_way_path(tmp_path: Path) -> None:
     experience = Experience("robot")
     for places, seats in ((4, 1), (5, 2), (6, 3)):
         teach(experience, walk(tmp_path, places, seats))
@@ -162,14 +162,14 @@ def spoiled(memory: Memory, seed: int) -> Memory:
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("mode", ["strict", "guarded"])
-def test_rules_that_have_shown_nothing_do_not_lead(seed: int, mode: str) -> None:
+def test_rules_without_a_record_of_success_are_not_followed(seed: int, mode: str) -> None:
     family = random.Random(seed).choice(FAMILIES)
     within = problem(family, 10, seed)
     alone, beside = fast.plan(within, improve=0), plan(within, spoiled(taught(), seed), mode, improve=0)
     assert (beside.plan, beside.search) == (alone.plan, alone.search)
 
 
-def test_wrong_rules_cost_a_little_and_spoil_no_plan() -> None:
+def test_wrong_rules_cost_few_expansions_and_give_valid_plans() -> None:
     for family in ("served", "swap", "full"):
         within = problem(family, 12, 1)
         alone, misled = fast.plan(within), plan(within, inverted(taught()), "leading")
@@ -178,13 +178,13 @@ def test_wrong_rules_cost_a_little_and_spoil_no_plan() -> None:
         assert expanded(misled) <= 1.2 * expanded(alone) + 12
 
 
-def test_a_memory_that_knows_none_of_the_behaviours_is_not_asked() -> None:
+def test_a_memory_without_the_behaviours_of_the_task_is_not_used() -> None:
     within = problem("swap", 8)
     alone, with_memory = fast.plan(within), plan(within, foreign())
     assert {k: c.expanded for k, c in with_memory.search.items()} == {k: c.expanded for k, c in alone.search.items()}
 
 
-def test_rules_do_not_lead_to_goals_of_which_they_reached_less_than_half() -> None:
+def test_rules_are_not_followed_for_goals_of_which_they_reached_less_than_half() -> None:
     within, memory = problem("rotate", 12, 1), taught(FAMILIES)
     poor = Experience("robot")
     poor.merge(memory.experience)
@@ -201,7 +201,7 @@ def test_untrusted_memory_runs_in_strict_mode_by_itself() -> None:
     assert expanded(plan(within, untrusted, "leading")) == expanded(plan(within, taught(), "strict"))
 
 
-def test_what_is_unsolvable_stays_so() -> None:
+def test_an_unsolvable_task_stays_unsolvable_with_memory() -> None:
     assert plan(problem("unsolvable", 4), taught()).status is Status.UNSOLVABLE
 
 
@@ -210,14 +210,14 @@ def test_the_same_call_gives_the_same_plan() -> None:
     assert plan(within, taught()).plan == plan(within, taught()).plan
 
 
-def test_refinements_are_remembered_and_not_searched_again() -> None:
+def test_refinements_are_remembered_and_not_searched_for_again() -> None:
     within, methods = problem("served", 8), [m for m in taught().experience.said.values() if isinstance(m, Method)]
     assert {m.behavior for m in methods} == {"B1_MOVE", "B1_POUR", "B2_PICK", "B2_PLACE", "B2_POUR"}
     led = plan(within, taught())
     assert led.misses == 0 < fast.plan(within).misses
 
 
-def test_a_class_never_seen_does_exactly_as_well() -> None:
+def test_objects_of_an_unseen_subclass_are_planned_for_with_the_same_steps_and_expansions() -> None:
     bowl = "\n:Bowl a owl:Class, owl:NamedIndividual ; rdfs:subClassOf k:Cup .\n"
 
     def bowls(text: str) -> str:
@@ -245,7 +245,7 @@ def by_the_other_hand(step: Step) -> Step:
     )
 
 
-def test_a_preference_that_flips_is_relearned_within_ten_episodes_after_forty() -> None:
+def test_a_preference_that_flips_after_forty_episodes_is_relearned_within_ten() -> None:
     within, experience = problem("served", 2, 7), Experience("robot")
     one = teach(experience, within)
     assert one is not None and hands(one) == {"hand1"}  # either hand could do all steps
@@ -260,7 +260,7 @@ def test_a_preference_that_flips_is_relearned_within_ten_episodes_after_forty() 
     assert episodes <= 10
 
 
-def test_a_hand_that_failed_at_a_place_is_not_taken_for_it_again_and_the_way_of_doing_it_is_not_to_blame() -> None:
+def test_a_hand_that_failed_at_a_place_is_avoided_there_and_the_method_gets_no_failure() -> None:
     within, experience = problem("served", 2, 7), Experience("robot")
     made = teach(experience, within)
     assert made is not None
@@ -275,7 +275,7 @@ def test_a_hand_that_failed_at_a_place_is_not_taken_for_it_again_and_the_way_of_
     assert not any(isinstance(one, Method) and one.open for one in blamed)
 
 
-def test_what_failed_is_less_cogent_and_what_it_was_about_is_counted() -> None:
+def test_a_failed_rule_becomes_less_cogent_and_a_chosen_rule_is_counted() -> None:
     within, memory = problem("served", 6, 1), taught()
     call = Call(within, compiled(within), None, 1000)
     policy = RulePolicy(call, memory.rules, memory.orders)
@@ -308,7 +308,7 @@ def jugs(cups: int, stuck: int) -> Problem:
     )  # fmt: skip
 
 
-def test_what_could_not_be_refined_is_not_tried_again_whether_taught_or_lived() -> None:
+def test_a_step_without_refinement_is_not_tried_again_after_a_lesson_or_an_episode() -> None:
     within, experience = jugs(10, 7), Experience("robot")
     alone = fast.plan(within)
     teach(experience, jugs(2, 2))
@@ -320,7 +320,7 @@ def test_what_could_not_be_refined_is_not_tried_again_whether_taught_or_lived() 
         live(experience, within, led.plan)
 
 
-def test_regression_asks_over_roles_for_what_a_step_to_the_goal_needs() -> None:
+def test_regression_gives_rules_whose_conditions_have_roles_and_no_individuals() -> None:
     within = problem("swap", 4, 1)
     found = fast.plan(within, improve=0).plan
     assert found is not None
@@ -332,7 +332,7 @@ def test_regression_asks_over_roles_for_what_a_step_to_the_goal_needs() -> None:
     assert not constants & {term for rule in rules for term in (*rule.goal.arguments, rule.goal.value, *rule.does[1])}
 
 
-def test_what_comes_first_is_learned_from_several_orders() -> None:
+def test_the_order_of_goals_is_learned_from_several_plans() -> None:
     orders = [one for one in taught().experience.said.values() if isinstance(one, Order)]
     first = Order("LOCATION", "BEVERAGE", ((0, 0),))
     assert first in orders
@@ -340,7 +340,7 @@ def test_what_comes_first_is_learned_from_several_orders() -> None:
     assert first.reversed not in taught().orders
 
 
-def test_where_a_level_is_left_rules_still_act_on_the_level_of_their_behaviours_alone() -> None:
+def test_rules_act_on_the_level_of_their_behaviours_even_if_a_plan_leaves_a_level() -> None:
     within = van().problem
     experience = Experience("robot")
     teach(experience, within)
@@ -381,7 +381,7 @@ def test_rules_lead_refinements_where_most_of_the_effort_is() -> None:
 
 
 @pytest.mark.parametrize("world", ["laboratory", "couriers", "packing", "canteen"])
-def test_one_lesson_carries_a_world_five_times_as_large(world: str) -> None:
+def test_one_lesson_in_a_small_world_suffices_for_a_large_world(world: str) -> None:
     small, large = (confab.load(f"{world}-{size}").problem for size in ("small", "large"))
     experience = Experience("robot")
     teach(experience, small)
@@ -391,7 +391,7 @@ def test_one_lesson_carries_a_world_five_times_as_large(world: str) -> None:
     assert expanded(led) <= 1.1 * led.plan.length[1]
 
 
-def test_where_anything_would_do_rules_take_what_nobody_has_and_no_goal_wants() -> None:
+def test_rules_prefer_unassigned_objects_so_that_plans_get_no_longer() -> None:
     for family, n in (("swap", 20), ("swap", 40), ("rotate", 40)):
         within = problem(family, n, 5000)
         alone, led = fast.plan(within, improve=0), plan(within, taught(FAMILIES), improve=0)
@@ -400,12 +400,12 @@ def test_where_anything_would_do_rules_take_what_nobody_has_and_no_goal_wants() 
         assert len(led.plan.steps) <= len(alone.plan.steps)
 
 
-def test_who_only_follows_rules_does_not_load_how_they_are_learned() -> None:
+def test_advice_by_rules_does_not_import_the_modules_for_learning() -> None:
     text = "import sys, confab.planner.experience.advice; print([m for m in sys.modules if m.endswith(('regression', 'lessons'))])"
     assert subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True).stdout == "[]\n"
 
 
-def test_nothing_is_collected_while_a_call_with_memory_compiles(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_garbage_collection_is_disabled_while_a_call_with_memory_compiles(monkeypatch: pytest.MonkeyPatch) -> None:
     enabled = []
 
     def watched(problem: Problem) -> Compiled:
@@ -417,7 +417,7 @@ def test_nothing_is_collected_while_a_call_with_memory_compiles(monkeypatch: pyt
     assert enabled == [False]
 
 
-def test_rules_ask_for_what_something_that_is_defined_rests_on() -> None:
+def test_rules_for_a_defined_goal_require_the_facts_of_its_definition() -> None:
     experience = Experience("robot")
     teach(experience, confab.load("gallery-small").problem)
     opening = [r for r in rules_in(experience) if r.goal.situation == "WAY" and r.does[0] == "OPEN_DOOR"]
@@ -431,7 +431,7 @@ def test_rules_ask_for_what_something_that_is_defined_rests_on() -> None:
         )
 
 
-def test_rules_are_learned_where_amounts_are_compared() -> None:
+def test_rules_are_learned_in_a_domain_with_comparisons_of_amounts() -> None:
     small, large = (confab.load(f"canteen-{size}").problem for size in ("small", "large"))
     experience = Experience("robot")
     teach(experience, small)
@@ -441,7 +441,9 @@ def test_rules_are_learned_where_amounts_are_compared() -> None:
     assert 3 * expanded(led) < 2 * expanded(alone)
 
 
-def test_what_was_reached_before_is_not_doubted_soon(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_goals_that_rules_have_reached_before_are_planned_without_a_search_for_a_proof(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def proved(*_: object) -> Task | Reason:
         raise AssertionError("looked for a proof")
 
@@ -454,7 +456,7 @@ def test_what_was_reached_before_is_not_doubted_soon(monkeypatch: pytest.MonkeyP
         fast.plan(large, improve=0)  # its goals are achieved in series
 
 
-def test_a_promise_that_is_broken_is_undone_and_no_rule_is_tried_until_search_has_done_ten_times_as_much() -> None:
+def test_steps_of_a_failed_rule_are_undone_and_rules_pause_until_search_has_done_ten_times_the_work() -> None:
     within = problem("swap", 12, 1)
     call = Call(within, compiled(within), None, 10_000)
     moving = [rule for rule in taught().rules if rule.does[0] == "B1_MOVE"]
@@ -477,7 +479,7 @@ def test_a_promise_that_is_broken_is_undone_and_no_rule_is_tried_until_search_ha
     assert policy.ready()
 
 
-def test_what_rules_are_asked_in_vain_is_counted_and_stopped_where_it_becomes_too_much() -> None:
+def test_wasted_work_of_rules_is_counted_and_rules_pause_above_a_limit() -> None:
     within = problem("swap", 12, 1)
     call = Call(within, compiled(within), None, 100_000)
     policy = RulePolicy(call, taught().rules)
@@ -495,7 +497,7 @@ def test_what_rules_are_asked_in_vain_is_counted_and_stopped_where_it_becomes_to
     assert policy.follow(level, targets, keep)
 
 
-def test_of_an_amount_rules_say_whether_it_becomes_more_or_less_not_how_much_there_was_once() -> None:
+def test_rules_about_an_amount_state_more_or_less_and_no_number() -> None:
     experience = Experience("robot")
     teach(experience, confab.load("canteen-small").problem)
     about = [rule for rule in rules_in(experience) if rule.goal.situation == "SERVINGS"]
@@ -504,7 +506,7 @@ def test_of_an_amount_rules_say_whether_it_becomes_more_or_less_not_how_much_the
     assert not {rule.does[0] for rule in about if rule.goal.value == LESS} & {"L1_REFILL", "L2_FILL"}
 
 
-def test_where_somebody_was_who_rests_there_becomes_a_role_like_any_other_place() -> None:
+def test_a_place_that_is_also_a_rest_value_becomes_a_role_in_rules() -> None:
     experience = Experience("robot")
     teach(experience, confab.load("canteen-small").problem)
     drives = [rule for rule in rules_in(experience) if rule.does[0] == "L2_DRIVE"]
@@ -540,7 +542,9 @@ def dairy(folder: Path, orders: int, each: int, moulds: int = 1, domain: str = D
     return imported(parse_files(folder / "domain.pddl", folder / "problem.pddl")).problem
 
 
-def test_what_is_so_when_nobody_is_otherwise_is_brought_about_by_rules_one_after_the_other(tmp_path: Path) -> None:
+def test_a_goal_that_no_object_violates_a_condition_is_achieved_by_rules_one_object_after_another(
+    tmp_path: Path,
+) -> None:
     experience = Experience("robot")
     teach(experience, dairy(tmp_path, 1, 2))
     large = dairy(tmp_path, 3, 5)
@@ -550,7 +554,7 @@ def test_what_is_so_when_nobody_is_otherwise_is_brought_about_by_rules_one_after
     assert expanded(outcome) == len(outcome.plan.steps)
 
 
-def test_a_rule_for_what_nobody_may_be_speaks_of_whom_it_was_about(tmp_path: Path) -> None:
+def test_a_rule_for_a_no_object_condition_relates_the_object_to_the_goal(tmp_path: Path) -> None:
     small = dairy(tmp_path, 1, 2)
     experience = Experience("robot")
     teach(experience, small)
@@ -561,7 +565,7 @@ def test_a_rule_for_what_nobody_may_be_speaks_of_whom_it_was_about(tmp_path: Pat
         assert any(isinstance(c, RelationCondition) and c.arguments == who for c in rule.asks)
 
 
-def test_what_is_nearer_by_another_way_is_not_taken_for_out_of_reach(tmp_path: Path) -> None:
+def test_a_goal_that_is_nearer_by_another_rule_is_not_called_unreachable(tmp_path: Path) -> None:
     experience = Experience("robot")
     small = dairy(tmp_path, 1, 1)
     teach(experience, small)
@@ -600,7 +604,7 @@ def lorries(folder: Path, lorries: int, crates: int, places: int, each: int = 0)
     return imported(parse_files(folder / "domain.pddl", folder / "problem.pddl")).problem
 
 
-def test_who_no_longer_fits_once_the_rest_is_brought_about_is_changed_for_who_does(tmp_path: Path) -> None:
+def test_an_assigned_object_that_becomes_unsuitable_is_replaced_by_a_suitable_one(tmp_path: Path) -> None:
     experience = Experience("robot")
     for crates, places in ((1, 3), (2, 4), (3, 4)):
         teach(experience, lorries(tmp_path, 1, crates, places))
@@ -613,7 +617,7 @@ def test_who_no_longer_fits_once_the_rest_is_brought_about_is_changed_for_who_do
     )  # the free room of a lorry on arrival differs from its free room before
 
 
-def test_a_plan_that_leaves_a_level_is_learned_from_though_that_level_does_not_see_where_the_van_is() -> None:
+def test_a_plan_that_leaves_a_level_teaches_rules_of_lower_levels() -> None:
     within = van().problem
     whole = fast.plan(within, improve=0).plan
     assert whole is not None
@@ -626,7 +630,9 @@ def test_a_plan_that_leaves_a_level_is_learned_from_though_that_level_does_not_s
     assert min(within.domain.behaviors[rule.does[0]].level for rule in rules_in(experience)) == 2
 
 
-def test_a_way_is_not_changed_for_one_that_lacks_less_but_is_out_of_reach(tmp_path: Path) -> None:
+def test_an_instance_of_a_rule_is_not_replaced_by_an_unreachable_one_with_fewer_unmet_conditions(
+    tmp_path: Path,
+) -> None:
     turn, brine = (f"(:action {name} :parameters (?c - cheese) :effect ({name}ed ?c))" for name in ("turn", "brin"))
     stays = DAIRY.replace("(and (not (in ?c ?m)) (not (full ?m)) (salted ?c))", "(salted ?c)")
     stays = stays.replace("(and (in ?c ?m) (pressed ?c))", "(and (in ?c ?m) (pressed ?c) (turned ?c) (brined ?c))")
@@ -640,7 +646,7 @@ def test_a_way_is_not_changed_for_one_that_lacks_less_but_is_out_of_reach(tmp_pa
     assert expanded(outcome) == len(outcome.plan.steps)  # one condition is unmet for salted cheese: that it is unsalted
 
 
-def test_each_of_all_of_whom_a_step_asks_something_has_steps_of_its_own(tmp_path: Path) -> None:
+def test_each_object_of_a_condition_on_all_objects_gets_its_own_steps(tmp_path: Path) -> None:
     none = "(not (exists (?c - cheese) (and (part ?c ?o) (not (salted ?c)))))"
     ship = f"(:action ship :parameters (?o - order) :precondition {none} :effect (ready ?o))"
     shipped = DAIRY.replace(f"(:derived (ready ?o - order) {none})", ship)
@@ -652,7 +658,7 @@ def test_each_of_all_of_whom_a_step_asks_something_has_steps_of_its_own(tmp_path
     assert expanded(outcome) == len(outcome.plan.steps)
 
 
-def test_who_is_somewhere_else_does_not_stand_for_all_of_his_kind(tmp_path: Path) -> None:
+def test_an_unreachable_individual_does_not_make_the_others_of_its_class_unreachable(tmp_path: Path) -> None:
     experience = Experience("robot")
     for crates, places in ((1, 3), (2, 4), (3, 4)):
         teach(experience, lorries(tmp_path, 1, crates, places))

@@ -47,20 +47,20 @@ def test_no_hand_does_two_things_at_once() -> None:
                 assert one.end <= other.begin or other.end <= one.begin
 
 
-def test_without_room_for_two_it_is_done_one_by_one() -> None:
+def test_a_schedule_is_sequential_if_no_two_steps_may_overlap() -> None:
     slots = schedule(serving(), planned().primitives, apart=lambda one, other: False)
     assert makespan(slots) == 32
 
 
 @given(st.randoms(use_true_random=False))
-def test_every_order_that_keeps_the_partial_order_is_a_plan_to_the_same_end(random: object) -> None:
+def test_every_linear_order_of_the_partial_order_is_a_valid_plan(random: object) -> None:
     primitives, order = planned().primitives, needed()
     key = {i: random.random() for i in order}  # type: ignore[attr-defined]
     line = networkx.lexicographical_topological_sort(order, key=lambda i: key[i])
     assert validate(serving(), Plan(tuple(primitives[i] for i in line))) == []
 
 
-def test_a_pour_waits_for_the_cup_and_the_cup_for_nobody() -> None:
+def test_reaching_for_a_cup_waits_for_its_put_down_and_reaching_for_a_bottle_waits_for_no_step() -> None:
     primitives = planned().primitives
     order = partial_order(serving(), primitives)
     position = {str(step): i for i, step in enumerate(primitives)}
@@ -80,7 +80,7 @@ def step(name: str, *arguments: str) -> Step:
 FORK: PartialOrder = networkx.DiGraph([(0, 1), (1, 2), (0, 3)])
 
 
-def test_how_urgent_a_step_is_is_how_long_the_longest_chain_behind_it_takes() -> None:
+def test_the_urgency_of_a_step_is_the_duration_of_the_longest_chain_behind_it() -> None:
     assert urgency_of(FORK) == {0: 3.0, 1: 2.0, 2: 1.0, 3: 1.0}
 
 
@@ -100,12 +100,12 @@ def test_a_step_begins_when_all_before_it_has_ended_the_most_urgent_first() -> N
     assert begin({0, 1, 3}, [3], urgency) == []
 
 
-def test_who_does_a_step_is_the_first_worker_that_it_names() -> None:
+def test_the_worker_of_a_step_is_the_first_worker_among_its_arguments() -> None:
     assert worker_of(step("GIVE", "cup1", "right", "left"), ["left", "right"]) == "right"
     assert worker_of(step("WAIT", "cup1"), frozenset(["left"])) == ""
 
 
-def test_steps_take_the_seconds_that_are_said_and_the_longest_chain_goes_first() -> None:
+def test_a_schedule_has_the_given_durations_and_slots_sorted_by_begin() -> None:
     primitives = planned().primitives
     slow = {i: 1.0 + i % 3 for i in range(len(primitives))}
     slots = schedule(serving(), primitives, slow)
@@ -116,7 +116,7 @@ def test_steps_take_the_seconds_that_are_said_and_the_longest_chain_goes_first()
     assert schedule(serving(), ()) == []
 
 
-def test_the_order_names_its_steps_and_refuses_what_cannot_be_done() -> None:
+def test_the_partial_order_labels_its_steps_and_refuses_inapplicable_steps() -> None:
     primitives = planned().primitives
     assert {i: data["label"] for i, data in needed().nodes(data=True)} == dict(enumerate(map(str, primitives)))
     with pytest.raises(ValueError, match="isn't applicable in the state before it"):

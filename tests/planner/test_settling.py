@@ -26,7 +26,7 @@ def course(problem: Problem) -> list[State]:
 
 
 @pytest.mark.parametrize("number", (2, 16, 20, 26))
-def test_from_any_state_of_a_plan_the_rest_is_planned_soon(number: int) -> None:
+def test_the_rest_of_a_plan_is_planned_with_few_expansions_from_each_of_its_states(number: int) -> None:
     problem = family("served", 5)
     here = replace(problem, initial=course(problem)[number])
     outcome = plan(here, limits=Limits(expansions=10_000))
@@ -34,7 +34,7 @@ def test_from_any_state_of_a_plan_the_rest_is_planned_soon(number: int) -> None:
     assert validate(here, outcome.plan) == []
 
 
-def test_steps_of_a_lower_level_that_bring_something_to_rest_are_told() -> None:
+def test_steps_of_a_lower_level_that_bring_symbols_to_rest_are_reported() -> None:
     problem = family("served", 5)
     held = next(state for state in course(problem) if "in_hand" in state.values())
     outcome = plan(replace(problem, initial=held))
@@ -45,7 +45,7 @@ def test_steps_of_a_lower_level_that_bring_something_to_rest_are_told() -> None:
 
 
 @pytest.mark.parametrize("seed", (9902726, 9903910, 9904745))
-def test_the_lowest_level_alone_leaves_nothing_touched_that_was_found_not_at_rest(
+def test_a_task_that_is_not_at_rest_initially_is_solved_on_the_lowest_level_alone(
     seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("confab.planner.hierarchical.agenda.Agenda.achieve_all", lambda agenda: False)

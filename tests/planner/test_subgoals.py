@@ -34,7 +34,7 @@ def ask_anew(wants: Subgoals, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(("name", "problem"), CASES, ids=[name for name, _ in CASES])
-def test_wants_that_are_kept_are_those_of_the_present_state(
+def test_cached_subgoals_are_those_of_the_present_state(
     name: str, problem: Problem, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rng = random.Random(name)
@@ -68,7 +68,7 @@ def test_wants_that_are_kept_are_those_of_the_present_state(
     assert asked or not problem.goal
 
 
-def test_tuples_of_many_places_are_gone_through_by_what_is_known_of_them(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tuples_of_many_places_are_searched_by_their_known_arguments(monkeypatch: pytest.MonkeyPatch) -> None:
     """A turntable has four of many spots: the search doesn't test all combinations of four spots."""
     spots = tuple(f"spot{i}" for i in range(40))
     tables = tuple(f"table{i}" for i in range(10))
@@ -133,7 +133,7 @@ def museum(rooms: int) -> Problem:
     )  # fmt: skip
 
 
-def test_whoever_stands_in_the_wrong_room_wants_the_next_one_though_its_door_is_shut() -> None:
+def test_the_scope_of_a_search_contains_the_rooms_and_closed_doors_on_the_path() -> None:
     problem = museum(9)
     call = Call(problem, Compiled(Program(problem)), None, 10_000)
     target: dict[Cell, str] = {("CRATE_AT", "crate"): "room8"}
@@ -142,7 +142,7 @@ def test_whoever_stands_in_the_wrong_room_wants_the_next_one_though_its_door_is_
     )
 
 
-def test_a_step_that_leads_away_first_and_back_is_refined_by_few_expansions() -> None:
+def test_a_step_with_a_long_detour_is_refined_with_few_expansions() -> None:
     outcome = plan(museum(21), limits=Limits(expansions=6_000))
     assert outcome.status is Status.SOLVED and outcome.plan is not None
     assert outcome.plan.length[1] == 1 and not outcome.given_up

@@ -74,7 +74,7 @@ def test_every_step_spans_its_refinement() -> None:
             )
 
 
-def test_turns_go_to_another_hand_only_if_it_reaches_the_places_of_the_steps_above() -> None:
+def test_steps_are_given_to_another_hand_only_if_it_reaches_the_places_of_the_upper_steps() -> None:
     problem = family("swap", 6, 1)
     found = plan(problem).plan
     assert found is not None
@@ -120,7 +120,7 @@ def test_the_checker_rejects_a_wrong_duration() -> None:
     assert any("takes" in fault.text for fault in validate_timed(serving(), replace(served(), slots=tuple(slots))))
 
 
-def test_a_window_and_a_deadline_are_kept_or_said_to_be_missed() -> None:
+def test_a_window_and_a_deadline_are_kept_or_reported_as_missed() -> None:
     found, goal = plan(serving()).plan, next(iter(serving().goal))
     assert found is not None
     late = replace(serving(), times=Times(windows={"right_hand": ((Fraction(5), None),)}))
@@ -187,7 +187,7 @@ def test_a_deadline_bounds_the_begin_of_a_step_that_achieves_its_goal_at_the_sta
     assert timed.plan is not None
 
 
-def test_a_schedule_for_which_no_time_is_left_is_given_up_by_name() -> None:
+def test_a_schedule_without_remaining_time_is_given_up_and_named() -> None:
     outcome = plan(serving())
     with within(0.0) as deadline:
         told, timed = scheduled(serving(), outcome, deadline, shorten=True)

@@ -50,7 +50,9 @@ def test_a_refinement_that_leaves_the_object_in_the_hand_is_found(serving: Probl
     assert "its refinement leaves <cup1, LOCATION> = in_hand" in faults(serving, (unfinished, *steps[1:]))
 
 
-def test_after_a_refinement_that_cannot_be_done_nothing_more_is_said(serving: Problem, steps: tuple[Step, ...]) -> None:
+def test_the_checker_reports_one_fault_for_a_refinement_that_is_not_applicable(
+    serving: Problem, steps: tuple[Step, ...]
+) -> None:
     turned = replace(steps[0], steps=steps[0].steps[::-1])
     assert faults(serving, (turned, *steps[1:])).count("\n") == 0
 
@@ -111,7 +113,7 @@ def test_a_step_without_refinement_among_refined_ones_is_found() -> None:
     )
 
 
-def test_a_refinement_that_changes_more_than_its_step_says_is_found() -> None:
+def test_a_refinement_with_more_effects_than_its_step_is_detected() -> None:
     case = tool()
     first, second = solved(case)
     assert "leaves <leg2, AT> = mounted, not bin" in faults(

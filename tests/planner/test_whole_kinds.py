@@ -65,7 +65,7 @@ class Stage:
 
 
 @pytest.mark.parametrize("mode", ["guarded", "optimal", "paper"])
-def test_whatever_is_on_the_cart_goes_along_and_every_lamp_is_lit(mode: str) -> None:
+def test_all_objects_on_the_cart_move_with_it_and_every_lamp_is_lit(mode: str) -> None:
     stage, plan = Stage(), solve(Request(recognise(load(THEATRE / "first-night.ttl")).problem, mode)).plan
     assert plan is not None
     for step in plan.steps:
@@ -81,7 +81,7 @@ def test_a_goal_for_all_of_a_class_is_one_for_each() -> None:
     assert problem.goal == wanted | {Symbol("STOWED", (prop,)): "false" for prop in problem.classes["Prop"]}
 
 
-def test_one_of_all_that_lacks_something_forbids_the_step(theatre: Theatre) -> None:
+def test_one_member_that_violates_a_condition_on_its_class_prevents_the_step(theatre: Theatre) -> None:
     goal = ":night.off"
     path = theatre(f"c:goal :night.lit, {goal}", "c:goal :night.lit")
     for old, status in (("d:hours 0.5", "SOLVED"), ("d:hours 0.4", "UNSOLVABLE")):
@@ -89,7 +89,7 @@ def test_one_of_all_that_lacks_something_forbids_the_step(theatre: Theatre) -> N
         assert solve(Request(read(load(path)).problem)).status.name == status
 
 
-def test_the_slice_has_whom_a_goal_names_by_their_class(theatre: Theatre) -> None:
+def test_the_slice_contains_all_members_of_a_class_that_a_goal_names(theatre: Theatre) -> None:
     more = ":lantern a owl:NamedIndividual, d:Lamp ; c:index 15 ; d:hangsOn :front ; d:hours 1.0 .\n:night a"
     path = theatre(":night a", more)
     assert "lantern" in recognise(load(path)).problem.classes["Lamp"]
@@ -107,7 +107,9 @@ def test_the_theatre_is_valid() -> None:
         (":Prop ; c:situationType :STOWED ;", ":Prop ; c:situationType :LADEN ; c:value :Prop ;", "names the class Prop twice"),
     ],
 )  # fmt: skip
-def test_what_cant_be_meant_of_all_is_said(theatre: Theatre, old: str, new: str, said: str) -> None:
+def test_invalid_uses_of_a_class_in_place_of_an_individual_are_refused(
+    theatre: Theatre, old: str, new: str, said: str
+) -> None:
     with pytest.raises(KnowledgeError, match=said):
         read(load(theatre(old, new)))
 
@@ -117,7 +119,7 @@ def test_validation_names_a_class_that_never_has_the_situation_type(theatre: The
     assert "night.lit requires LIT of Circuit, but no Circuit can have that situation type" in found
 
 
-def test_who_is_only_one_of_a_kind_is_not_taken_for_named(theatre: Theatre) -> None:
+def test_individuals_that_are_only_members_of_a_named_class_do_not_count_as_named(theatre: Theatre) -> None:
     problem = read(load(THEATRE / "first-night.ttl")).problem
     spread = {one for behavior in problem.domain.behaviors.values() for one in behavior.spread}
     assert {"crown", "skull", "sword"} <= spread
