@@ -211,7 +211,7 @@ def repeated_names(case: Case) -> Iterator[Fault]:
                     f"a negated condition of {name} requires that {term} is of the class {one.kind}, "
                     f"{'which always holds' if anyway else f'but no {outer} is'}",
                     f"{term} denotes the same {outer} inside and outside of the negated condition",
-                    f"if the negated condition is about another {one.kind}, give that another name than {term}; if it is "
+                    f"if the negated condition is about another {one.kind}, use another name than {term} for it; if it is "
                     f"about {term} itself, "
                     "remove the class from the condition",
                 )
