@@ -308,6 +308,11 @@ class Engine:
             self.sighted = self.steps, found
         return self.sighted[1]
 
+    def look_again(self) -> None:
+        """Drop what was seen in this simulation step, after bodies have been moved without a step."""
+        self.sighted = None
+        self.remembered.clear()
+
     def _thing(self, name: str) -> tuple[int, Shape, tuple[Array, Array] | None]:
         thing = self.bodies.get(name)
         if thing is None:

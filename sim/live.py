@@ -220,6 +220,7 @@ class LiveWorld:
             for fact in intervention.facts:
                 if fact.symbol.arguments[0] in (*self.world.bodies, *self.world.links):  # the object may be gone
                     self._make_true(fact)
+        self.world.look_again()
 
     def _make_true(self, fact: Fact) -> None:
         use = self.world.embodiment.perceivers[fact.symbol.situation]

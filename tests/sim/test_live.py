@@ -1,6 +1,7 @@
 """A world in which people interfere: possible interventions, their effects, and the attribution of failures."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -125,6 +126,14 @@ def test_a_thing_of_which_no_fact_speaks_is_fixed_if_no_hand_opens_wide_enough(l
     (box,) = live.discoveries()
     assert box.kinds == ("Movable",)
     assert "hands open to 10 cm" in box.fixed
+
+
+def test_a_box_that_interrupts_a_primitive_is_seen_before_the_next_simulation_step(live: LiveWorld) -> None:
+    box = handled(InterventionKind.BOX, "box1", 0.06, 0.06, 0.12, place="location7")
+    live.announce((replace(box, at=0.03),))
+    step = Step((0,), 0, 3, "B3_REACH_HAND_LOCATION", ("right_hand", "location7"))
+    assert live.execute(step).code == "interrupted"
+    assert live.observe()[LOCATION["box1"]] == "location7"
 
 
 def test_what_lies_is_at_no_place_and_is_said_to_lie(live: LiveWorld) -> None:
