@@ -205,7 +205,7 @@ class Film:
         taken: list[tuple[float, float, float, float]] = []
         for name in (*world.bodies, *world.embodiment.places):
             points = _points(world, name)
-            if not any(_visible(world, self.camera, point, name) for point, _ in points):
+            if _covered(world, name) or not any(_visible(world, self.camera, point, name) for point, _ in points):
                 continue
             x, y = self.camera.pixel(points[0][0])
             words, thing = self.names.get(name, name), name in world.bodies
@@ -216,9 +216,8 @@ class Film:
             if box is None:
                 continue
             taken.append(box)
-            if thing:
-                draw.rounded_rectangle(box, 4, fill=(40, 50, 70, 190))
-            color = (250, 251, 253, 255) if thing else (60, 40, 20, 200)
+            draw.rounded_rectangle(box, 4, fill=(40, 50, 70, 190) if thing else (250, 251, 253, 110))
+            color = (250, 251, 253, 255) if thing else (60, 40, 20, 255)
             draw.text((x, (box[1] + box[3]) / 2), words, fill=color, font=font, anchor="mm")
         return np.asarray(canvas)
 
@@ -275,6 +274,19 @@ def _visible(world: Engine, camera: Camera, point: Array, name: str) -> bool:
     met = world.name_of(hit[0], hit[1])
     there = name in world.embodiment.places and met in world.bodies
     return met == name or (there and float(np.linalg.norm(world.truth(met)[1] - world.place(name))) < NEAR_PLACE)
+
+
+def _covered(world: Engine, name: str) -> bool:
+    """Return whether an object stands at a place on another object, whose name would hide the objects."""
+    place = world.embodiment.places.get(name)
+    return (
+        place is not None
+        and place.carrier in world.bodies
+        and any(
+            float(np.linalg.norm(world.truth(body)[1] - world.place(name))) < NEAR_PLACE
+            for body in world.bodies.keys() - {place.carrier}
+        )
+    )
 
 
 def _meets(box: tuple[float, float, float, float], others: Sequence[tuple[float, float, float, float]]) -> bool:
