@@ -19,6 +19,9 @@ from confab.sim.urdf import Array, UrdfModel, read_model, rotation
 WIDER = 0.25
 """Share of the range between `opened` and the upper limit by which a joint is opened farther than `opened`."""
 
+LONGEST, SLIM = 0.15, 0.7
+"""Maximum length in metres of a pictured post of a handle, and ratio of the post's width to the width of the handle's bar."""
+
 HERE = np.zeros(3)
 
 BASE = "base"
@@ -109,7 +112,7 @@ def written(mechanism: Mechanism) -> str:
     """Return a mechanism as URDF text with the short lines that PyBullet's parser requires."""
     lines = [f'<robot name="{mechanism.name}">', *_link(BASE, mechanism.parts, 0.0)]
     for link in mechanism.links:
-        lines += _link(link.name, link.parts, link.mass)
+        lines += _link(link.name, link.parts, link.mass, [*posts(link)])
         lines += [
             f'<joint name="{link.name}" type="{link.kind}">',
             f'<parent link="{link.parent or BASE}"/>',
@@ -123,8 +126,36 @@ def written(mechanism: Mechanism) -> str:
     return "\n".join([*lines, "</robot>", ""])
 
 
-def _link(name: str, parts: Sequence[Part], mass: float) -> list[str]:
-    """Return a link as lines of URDF, with the inertia of the box around its parts."""
+def posts(link: Link) -> Iterator[Part]:
+    """Yield posts that join the bars of handles to the solids behind the bars; only pictures show the posts."""
+    for feature in link.features.values():
+        ahead = rotation(*feature.turned)[:, 0]
+        turned = (0.0, float(np.arccos(np.clip(ahead[2], -1.0, 1.0))), float(np.arctan2(ahead[1], ahead[0])))
+        for bar in link.parts:
+            if bar.kind != "cylinder" or bar.name not in feature.parts:
+                continue
+            behind = [_solid(part) for part in link.parts if part is not bar and part.kind in ("box", "cylinder")]
+            for side in (-1.0, 1.0):
+                end = np.array(bar.position) + side * (bar.size[2] / 2 - bar.size[0]) * rotation(*bar.turned)[:, 2]
+                way = np.arange(0.0, LONGEST, 0.001)
+                gaps = [solid.distance(end + way[:, None] * ahead) for solid in behind]
+                inside = np.flatnonzero(np.min([np.full(len(way), np.inf), *gaps], axis=0) <= 0)
+                length = way[inside[0]] if len(inside) else 0.0
+                if length > bar.size[0] / 2:
+                    middle = end + length / 2 * ahead
+                    size = (bar.size[0] * SLIM, bar.size[0] * SLIM, float(length))
+                    yield Part(f"{bar.name}.post", "cylinder", size, (*middle.tolist(),), turned, bar.color)
+
+
+def _solid(part: Part) -> Solid:
+    """Return a box or cylinder in the frame of its link."""
+    return Solid(
+        part.name, part.kind, np.array(part.size) / 2, np.array(part.position), rotation(*part.turned), part.name
+    )
+
+
+def _link(name: str, parts: Sequence[Part], mass: float, pictured: Sequence[Part] = ()) -> list[str]:
+    """Return a link as lines of URDF, with the inertia of the box around its parts; `pictured` parts are only visible."""
     center, extent = np.zeros(3), np.full(3, 0.1)
     if parts:
         low = np.min([np.array(p.position) - np.array(p.size) / 2 for p in parts], axis=0)
@@ -142,11 +173,12 @@ def _link(name: str, parts: Sequence[Part], mass: float) -> list[str]:
         f'<inertia ixx="{ixx:.6g}" iyy="{iyy:.6g}" izz="{izz:.6g}" ixy="0" ixz="0" iyz="0"/>',
         "</inertial>",
     ]
-    for part in parts:
+    for part in (*parts, *pictured):
         where, form = _origin(part.position, part.turned), f"<geometry>{_form(part)}</geometry>"
         color = f'<material name="{part.name}"><color rgba="{_spaced(part.color)}"/></material>'
         lines += [f'<visual name="{part.name}">', where, form, color, "</visual>"]
-        lines += [f'<collision name="{part.name}">', where, form, "</collision>"]
+        if part not in pictured:
+            lines += [f'<collision name="{part.name}">', where, form, "</collision>"]
     return [*lines, "</link>"]
 
 

@@ -20,7 +20,7 @@ from confab.reasoner.symbols import Fact, Symbol
 from confab.scene import Scene
 from confab.sim import measuring, phases, touch
 from confab.sim.faults import displaced
-from confab.sim.linkage import read_mechanism, wide
+from confab.sim.linkage import posts, read_mechanism, solids, wide
 from confab.sim.live import LiveWorld
 from confab.sim.skills import perform
 from confab.sim.staging import Perturbation
@@ -305,3 +305,13 @@ def test_where_on_a_joint_s_path_a_hand_does_not_get_is_told() -> None:
     assert verdict.code == "unreachable"
     assert verdict.message == "where the joint is at 1.05, the hand would be too far"
     assert verdict.measured == pytest.approx({"joint": 1.05, "beyond_m": 0.009}, abs=0.01)
+
+
+def test_pictured_posts_join_the_bar_of_a_handle_to_the_door_and_are_no_solids() -> None:
+    for mechanism in confab.load("kitchen-corner").embodiment.mechanisms:
+        for link in mechanism.links:
+            first, second = posts(link)
+            assert np.allclose([first.size[2], second.size[2]], 0.045, atol=0.002)
+            assert [
+                solid.part for solid in solids(mechanism, read_mechanism(mechanism), {}) if "post" in solid.part
+            ] == []
