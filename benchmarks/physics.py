@@ -42,7 +42,7 @@ WORKERS = 2
 def case(name: str, perturb: Perturbation | None = None, beads: bool = True) -> Trial:
     """Return the trial of a shipped scene's plan."""
     scene = confab.load(name)
-    steps = scene.plan(mode="paper").plan.primitives
+    steps = scene.plan().plan.primitives
     return Trial(scene.embodiment, scene.problem.initial, steps, expectations(scene.problem, steps), perturb, beads)
 
 
@@ -93,7 +93,7 @@ def film() -> None:
     """Print the CPU time of filming the paper's plan."""
     with TemporaryDirectory() as folder:
         scene = confab.load("beverage-serving")
-        (rollout,) = scene.plan(mode="paper").verify(video=Path(folder) / "run.mp4").rollouts
+        (rollout,) = scene.plan().verify(video=Path(folder) / "run.mp4").rollouts
     print(f"film: {rollout.clock.rendering:.1f} CPU s beside {rollout.cpu_seconds:.1f} CPU s for the rollout")
 
 
