@@ -6,9 +6,9 @@ window. An operator is near if few steps lead from the start of the window to th
 the end of the window. The search is A* with h_FF (`confab.planner.grounded.shortest`). A state is dropped if, according to h,
 no cheaper plan leads through the state.
 
-Windows are tried on the given plan and on a regrouped plan, in which each step follows a step on which it depends. Finally, the
-remaining work is spent on the whole plan as one window, with all operators and a greater weight of h. Of two equally cheap
-plans, the plan with fewer steps counts as cheaper (`TRIFLE`).
+Windows are tried on the given plan and on a regrouped plan, in which each step follows a step on which it depends. The given order
+is kept if the other order saves nothing. Finally, the remaining work is spent on the whole plan as one window, with all operators
+and a greater weight of h. Of two equally cheap plans, the plan with fewer steps counts as cheaper (`TRIFLE`).
 
 Work is counted in examined operators instead of seconds. Therefore the result is the same on every machine.
 
@@ -83,7 +83,7 @@ def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None =
         before = task.cost_of(best)
         for size in SIZES:
             best = windows.pass_over(best, size)
-            best = windows.pass_over(cheaper(task, regrouped(task, best), best), size)
+            best = cheaper(task, best, windows.pass_over(regrouped(task, best), size))
         best = cheaper(task, best, shortened(task, best, deadline))
         if task.cost_of(best) == before or windows.over:
             return cheaper(task, windows.restarted(best), plan)
