@@ -37,7 +37,7 @@ def test_the_reference_has_every_public_name() -> None:
         assert inspect.getdoc(getattr(importlib.import_module(home), name)), name
 
 
-def test_what_can_be_called_has_an_example_or_says_where_one_is() -> None:
+def test_public_functions_have_docstrings_and_the_main_ones_have_examples() -> None:
     without = [
         f"{name}.{member}" if member else name
         for name in confab.__all__
@@ -54,7 +54,7 @@ def issubclass_of_error(of: object) -> bool:
 
 
 @pytest.mark.parametrize("page", ["tutorial", "how-to"])
-def test_every_command_and_call_of_a_page_exists(page: str) -> None:
+def test_all_commands_and_calls_of_a_page_exist(page: str) -> None:
     text = (DOCS / f"{page}.md").read_text(encoding="utf-8")
     commands = [one or other for one, other in COMMAND.findall(text)]
     assert len(commands) >= 6
@@ -75,7 +75,7 @@ def test_every_command_and_call_of_a_page_exists(page: str) -> None:
         assert named <= takes.keys() or "options" in takes, f"{home}.{name}({given})"
 
 
-def test_the_tutorial_prints_what_it_says() -> None:
+def test_the_code_of_the_tutorial_prints_the_stated_outputs() -> None:
     page = (DOCS / "tutorial.md").read_text(encoding="utf-8")
     code = "\n".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL))
     example = doctest.DocTestParser().get_doctest(code, {}, "tutorial", "tutorial.md", 0)
@@ -84,7 +84,7 @@ def test_the_tutorial_prints_what_it_says() -> None:
     assert result.failed == 0
 
 
-def test_what_shows_each_promise_is_there() -> None:
+def test_the_tests_and_benchmarks_of_each_promise_exist() -> None:
     text = (DOCS / "promises.md").read_text(encoding="utf-8")
     shown = set(re.findall(r"`pytest (\S+)(?: -k (?:\"([^\"]+)\"|(\w+)))?`", text))
     assert len(shown) == len(set(re.findall(r"`pytest [^`]*`", text))) > 12
@@ -116,7 +116,7 @@ def defined(file: Path) -> set[str]:
     return found
 
 
-def test_the_files_and_names_to_which_the_docs_lead_are_there() -> None:
+def test_the_files_and_names_in_references_of_the_docs_exist() -> None:
     text = "\n".join(page.read_text(encoding="utf-8") for page in (DOCS / "architecture.md", DOCS / "conditions.md"))
     named = re.findall(r"`([\w/]+\.py): ([\w., ]+)`", text)
     assert len(named) > 20

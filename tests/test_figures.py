@@ -33,7 +33,7 @@ def commit(root: Path, text: str) -> str:
 
 
 @pytest.mark.filterwarnings("default:stale figures")
-def test_every_block_of_figures_says_its_command_commit_and_date_and_stale_ones_are_told() -> None:
+def test_every_block_of_figures_states_its_command_commit_and_date_and_stale_blocks_are_listed() -> None:
     there = figures.blocks()
     assert len(there) >= 10
     assert [fault for block in there for fault in block.faults(figures.ROOT)] == []
@@ -45,14 +45,14 @@ def test_every_block_of_figures_says_its_command_commit_and_date_and_stale_ones_
         )
 
 
-def test_every_block_that_begins_ends_before_the_next() -> None:
+def test_every_block_of_figures_ends_before_the_next_one_begins() -> None:
     for path in [figures.ROOT / "README.md", *sorted((figures.ROOT / "docs").rglob("*.md"))]:
         text = path.read_text("utf-8")
         assert len(figures.BLOCK.findall(text)) == text.count("<!-- figures "), path.name
         assert not any("<!-- figures " in block["text"] for block in figures.BLOCK.finditer(text)), path.name
 
 
-def test_a_block_is_stale_once_what_it_measures_has_changed(tmp_path: Path) -> None:
+def test_a_block_of_figures_is_stale_after_a_change_of_the_measured_code(tmp_path: Path) -> None:
     first = commit(tmp_path, "first")
     page(tmp_path, GOOD.format(first))
     assert figures.stale(tmp_path) == []
@@ -64,7 +64,7 @@ def test_a_block_is_stale_once_what_it_measures_has_changed(tmp_path: Path) -> N
     ]
 
 
-def test_where_there_is_no_history_that_is_said(tmp_path: Path) -> None:
+def test_a_block_without_its_commit_in_the_history_is_reported(tmp_path: Path) -> None:
     page(tmp_path, GOOD.format("1234567"))
     (line,) = figures.stale(tmp_path)
     assert "can't be dated" in line
@@ -80,7 +80,7 @@ def test_where_there_is_no_history_that_is_said(tmp_path: Path) -> None:
         ("python -m benchmarks counts; commit 1234567; 2026-01-31; measures code/gone.py", "which doesn't exist"),
     ],
 )
-def test_a_block_that_lacks_something_is_a_fault(tmp_path: Path, header: str, said: str) -> None:
+def test_an_incomplete_block_of_figures_is_a_fault(tmp_path: Path, header: str, said: str) -> None:
     (tmp_path / "code").mkdir()
     page(tmp_path, header)
     (block,) = figures.blocks(tmp_path)
@@ -88,7 +88,7 @@ def test_a_block_that_lacks_something_is_a_fault(tmp_path: Path, header: str, sa
     assert said in fault
 
 
-def test_a_table_is_taken_out_of_what_is_printed() -> None:
+def test_a_table_is_extracted_from_printed_output() -> None:
     text = "first\n\n| a |\n|---|\n| 1 |\n\nsecond\n\n| b |\n|---|\n| 2 |"
     assert figures.chosen(text, 2) == "| b |\n|---|\n| 2 |"
     assert figures.chosen(text, 0) == text

@@ -86,7 +86,9 @@ def test_rooms_import_only_rooms_to_their_left() -> None:
         ("confab/seeded.py", "from tests import toy\n", "tests"),
     ],
 )
-def test_a_seeded_violation_is_caught(tmp_path: Path, path: str, source: str, package: str) -> None:
+def test_an_inserted_import_of_a_room_to_the_right_is_detected(
+    tmp_path: Path, path: str, source: str, package: str
+) -> None:
     for room in ROOMS:
         (tmp_path / room).mkdir()
         (tmp_path / room / "__init__.py").write_text("")
@@ -155,7 +157,7 @@ def test_no_modules_import_each_other() -> None:
         "if TYPE_CHECKING:\n    from confab.planner.one import X",
     ],
 )
-def test_a_seeded_cycle_is_found(tmp_path: Path, back: str) -> None:
+def test_an_inserted_import_cycle_is_detected(tmp_path: Path, back: str) -> None:
     (tmp_path / "planner").mkdir()
     (tmp_path / "planner" / "one.py").write_text("from confab.planner.two import f\n")
     (tmp_path / "planner" / "two.py").write_text("import confab.planner.three\n")
@@ -197,13 +199,13 @@ def astray(graph: Mapping[str, set[str]]) -> list[str]:
     return found
 
 
-def test_sub_rooms_of_the_planner_import_only_what_they_build_on() -> None:
+def test_sub_rooms_of_the_planner_import_only_the_sub_rooms_on_which_they_build() -> None:
     assert astray(imports(ROOT, ["planner"])) == []
     folders = {path.parent.name for path in (ROOT / "planner").glob("*/*.py")}
     assert folders == SUBROOMS.keys()
 
 
-def test_a_seeded_import_astray_is_found() -> None:
+def test_an_inserted_forbidden_import_within_the_planner_is_detected() -> None:
     graph = imports(ROOT, ["planner"])
     graph["confab.planner.paper.astar"] = {"confab.planner.hierarchical.symmetry", "confab.planner.plan"}
     graph["confab.planner.grounded.joins"] = {"confab.planner.hierarchical.symmetry", "confab.planner.solve"}
@@ -253,7 +255,7 @@ def run_elsewhere(code: str, directory: Path) -> object:
     return json.loads(done.stdout.splitlines()[-1])
 
 
-def test_every_room_is_the_one_in_this_repository(tmp_path: Path) -> None:
+def test_all_rooms_are_imported_from_this_repository(tmp_path: Path) -> None:
     names = [module_name(Path(room)) for room in ROOMS]
     code = f"import importlib, json; print(json.dumps([importlib.import_module(room).__file__ for room in {names}]))"
     assert run_elsewhere(code, tmp_path) == [str(ROOT.joinpath(*name.split("."), "__init__.py")) for name in names]

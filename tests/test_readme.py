@@ -8,7 +8,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
 
-def test_the_python_of_the_readme_prints_what_it_says() -> None:
+def test_the_code_of_the_readme_prints_the_stated_outputs() -> None:
     page = (ROOT / "README.md").read_text(encoding="utf-8")
     code = page.split("```python\n")[1].split("```")[0]
     example = doctest.DocTestParser().get_doctest(code, {}, "README", "README.md", 0)
@@ -17,7 +17,7 @@ def test_the_python_of_the_readme_prints_what_it_says() -> None:
     assert result.failed == 0
 
 
-def test_every_function_that_the_docs_send_a_reader_to_is_in_that_file() -> None:
+def test_all_functions_in_references_of_the_docs_are_in_their_files() -> None:
     sent = 0
     for page in PAGES:
         for path, name in re.findall(r"`([\w/]+\.py): ([\w.]+)`", page.read_text(encoding="utf-8")):
@@ -28,7 +28,7 @@ def test_every_function_that_the_docs_send_a_reader_to_is_in_that_file() -> None
     assert sent >= 20
 
 
-def test_every_file_that_the_docs_point_to_exists() -> None:
+def test_all_files_in_links_of_the_docs_exist() -> None:
     for page in PAGES:
         for target in re.findall(r"\]\(([^)#\s]+)", page.read_text(encoding="utf-8")):
             if "://" not in target:

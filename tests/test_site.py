@@ -162,7 +162,7 @@ def test_every_page_of_the_site_has_the_blocks_of_its_source(site: Path) -> None
 
 
 @needs_mkdocs
-def test_no_paragraph_of_the_site_holds_markup(site: Path) -> None:
+def test_no_paragraph_of_the_site_contains_markup(site: Path) -> None:
     for page in PAGES:
         for text in rendered((site / page.relative_to(DOCS)).with_suffix(".html")).paragraphs:
             assert not re.search(r"^\s*(```|\||#+ |[-*] |:::)|\]\(|`", text, re.MULTILINE), f"{page.name}: {text}"
@@ -194,7 +194,7 @@ def methods(home: type) -> list[str]:
 
 
 @needs_mkdocs
-def test_a_fence_that_the_site_can_not_read_is_found(tmp_path: Path) -> None:
+def test_a_fence_that_the_site_can_not_parse_is_detected(tmp_path: Path) -> None:
     text = "# Page\n\n```turtle toys/toys.ttl\n# Object types\n:a :b :c .\n```\n"
     (tmp_path / "docs").mkdir()
     (tmp_path / "docs" / "index.md").write_text(text)

@@ -46,7 +46,7 @@ def test_every_file_of_the_packages_is_in_the_wheel(wheel: Path) -> None:
     assert {Path(name).suffix for name in wanted} >= {".py", ".ttl", ".rq", ".html", ".css", ".js", ".urdf"}
 
 
-def test_installed_outside_of_the_repository_it_does_the_main_job(wheel: Path, tmp_path: Path) -> None:
+def test_the_installed_wheel_plans_and_verifies_outside_of_the_repository(wheel: Path, tmp_path: Path) -> None:
     """The environment contains the locked packages and the wheel's own files, and no file of the repository."""
     pytest.importorskip("pybullet")
     home = tmp_path / "environment"

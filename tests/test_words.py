@@ -75,6 +75,6 @@ def test_no_pronoun_stands_for_a_missing_noun() -> None:
     assert found == {}, "name the object, role, step or value instead of a pronoun"
 
 
-def test_no_turn_of_speech_has_to_be_guessed() -> None:
+def test_no_phrase_is_a_riddle() -> None:
     found = {file: words for file, text in texts().items() if (words := [m[0] for m in RIDDLES.finditer(text)])}
     assert found == {}, "use the field's verb or noun"

@@ -77,7 +77,7 @@ def anys() -> tuple[list[str], set[str]]:
     return found, {name for _, name in seen}
 
 
-def test_no_annotation_of_what_a_user_gets_has_any() -> None:
+def test_no_public_annotation_contains_any() -> None:
     found, seen = anys()
     assert {"Plan", "Outcome", "Rollout", "Episode", "Problem"} <= seen
     assert found == []

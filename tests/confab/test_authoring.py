@@ -16,7 +16,7 @@ from confab.reasoner.memory.links_file import memory_lines
 from confab.reasoner.validation.validate import validate
 
 
-def test_a_new_domain_validates_and_can_be_planned_in(tmp_path: Path) -> None:
+def test_a_new_domain_is_valid_and_has_a_plan(tmp_path: Path) -> None:
     files = new_domain("tearoom", tmp_path / "tearoom")
     assert sorted(file.name for file in files) == ["catalog-v001.xml", "tearoom-scene.ttl", "tearoom.ttl"]
     scene = tmp_path / "tearoom" / "tearoom-scene.ttl"
@@ -37,7 +37,7 @@ def test_a_new_domain_overwrites_nothing(tmp_path: Path) -> None:
         new_domain("tea room", tmp_path)
 
 
-def test_what_hands_reach_is_computed_when_it_is_missing_or_old(tmp_path: Path) -> None:
+def test_reach_facts_are_computed_if_they_are_missing_or_outdated(tmp_path: Path) -> None:
     new_domain("shop", tmp_path, bodies=True)
     scene, reach, said = tmp_path / "shop-scene.ttl", tmp_path / "shop-scene.reach.ttl", list[str]()
     assert not confab.load(scene).plan().solved
@@ -57,7 +57,7 @@ def test_what_hands_reach_is_computed_when_it_is_missing_or_old(tmp_path: Path) 
     assert "has no e:graspHeight" in said[-1]
 
 
-def test_the_difference_of_two_scenes_names_what_came_and_went(tmp_path: Path) -> None:
+def test_the_difference_of_two_scenes_names_added_and_removed_parts(tmp_path: Path) -> None:
     old, new = tmp_path / "old", tmp_path / "new"
     for folder in (old, new):
         new_domain("tearoom", folder)
@@ -93,7 +93,7 @@ def memory(tmp_path: Path) -> Path:
     return remembered.save(tmp_path / "memory.ttl")
 
 
-def test_a_renamed_term_takes_its_memory_along(memory: Path) -> None:
+def test_a_memory_can_be_migrated_to_a_renamed_term(memory: Path) -> None:
     graph = confab.load(memory.with_name("tearoom-scene.ttl")).knowledge
     assert unknown_terms(memory_lines(memory), graph) == []
     memory.write_text(memory.read_text().replace("tearoom#CLEANLINESS", "tearoom#CLEANLINES"))
@@ -102,7 +102,7 @@ def test_a_renamed_term_takes_its_memory_along(memory: Path) -> None:
     assert unknown_terms(memory_lines(memory), graph) == []
 
 
-def test_a_rename_reaches_the_words_of_facts_and_whole_words_only(memory: Path) -> None:
+def test_a_rename_changes_the_words_of_learned_facts_and_whole_words_only(memory: Path) -> None:
     assert ':asks "CLEANLINESS of item"' in memory.read_text()
     migrate(memory, ["CLEANLINESS=CLEAN"])
     text = memory.read_text()
@@ -115,7 +115,7 @@ def test_a_rename_reaches_the_words_of_facts_and_whole_words_only(memory: Path) 
 
 
 @pytest.mark.parametrize(("rename", "said"), [("Cup=Mug", "isn't in the memory"), ("Cup", "wanted OLD=NEW")])
-def test_a_rename_that_means_nothing_is_refused(memory: Path, rename: str, said: str) -> None:
+def test_an_invalid_rename_is_refused(memory: Path, rename: str, said: str) -> None:
     before = memory.read_bytes()
     with pytest.raises(KnowledgeError, match=said):
         migrate(memory, [rename])

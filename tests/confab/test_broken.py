@@ -82,7 +82,7 @@ def lived(replica: str, word: str = "yes") -> Experience:
 
 
 @pytest.mark.parametrize("name", ODD_NAMES)
-def test_any_name_and_any_text_is_written_so_that_it_can_be_read(tmp_path: Path, tearoom: Path, name: str) -> None:
+def test_any_name_and_text_in_a_memory_survives_saving_and_loading(tmp_path: Path, tearoom: Path, name: str) -> None:
     scene = confab.load(tearoom)
     memory = Memory.of(scene)
     memory.experience = lived(name, name.replace("\n", "") or "-")
@@ -97,7 +97,7 @@ def test_any_name_and_any_text_is_written_so_that_it_can_be_read(tmp_path: Path,
     assert Memory.load(tmp_path / "m.ttl", scene).experience == memory.experience
 
 
-def test_what_cannot_be_read_again_replaces_nothing(
+def test_a_memory_that_can_not_be_read_back_replaces_no_file(
     tmp_path: Path, tearoom: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     memory, file = Memory.of(confab.load(tearoom)), tmp_path / "m.ttl"
@@ -125,7 +125,7 @@ def test_what_cannot_be_read_again_replaces_nothing(
         (":episodes 1", ":episodes 1e9"),
     ],
 )
-def test_counts_that_cannot_be_are_refused(tmp_path: Path, tearoom: Path, old: str, new: str) -> None:
+def test_impossible_counts_in_a_memory_are_refused(tmp_path: Path, tearoom: Path, old: str, new: str) -> None:
     memory = Memory.of(confab.load(tearoom))
     memory.experience = lived("me")
     memory.save(tmp_path / "m.ttl")
@@ -153,7 +153,7 @@ def test_a_link_is_followed_and_permissions_stay(tmp_path: Path) -> None:
     assert new.stat().st_mode & 0o777 == 0o600
 
 
-def test_what_is_read_only_or_no_ordinary_file_stays_and_the_message_names_it(tmp_path: Path) -> None:
+def test_a_read_only_or_special_file_is_kept_and_the_message_names_it(tmp_path: Path) -> None:
     kept = tmp_path / "kept.ttl"
     kept.write_text("old")
     kept.chmod(0o444)
@@ -168,7 +168,7 @@ def test_what_is_read_only_or_no_ordinary_file_stays_and_the_message_names_it(tm
     assert kept.read_text() == "old"
 
 
-def test_a_full_disk_is_said_with_the_file_and_leaves_nothing_behind(tmp_path: Path) -> None:
+def test_the_message_on_a_full_disk_names_the_file_and_no_partial_file_remains(tmp_path: Path) -> None:
     program = (
         "import resource, sys; from pathlib import Path; from confab.reasoner.files import write_whole\n"
         "import signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN); resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))\n"
@@ -191,7 +191,7 @@ def test_a_full_disk_is_said_with_the_file_and_leaves_nothing_behind(tmp_path: P
     ("prepare", "said"),
     [("head -c 2m /dev/zero > fill", "No space left"), ("mount -o remount,ro .", "Read-only file system")],
 )
-def test_on_a_full_or_read_only_disk_the_file_is_named_and_the_old_one_stays(
+def test_on_a_full_or_read_only_disk_the_file_is_named_and_the_old_file_is_kept(
     tmp_path: Path, prepare: str, said: str
 ) -> None:
     memory = Memory.of(confab.load("living-room"))
@@ -231,7 +231,7 @@ print(Path("m.ttl").read_bytes() == before, sorted(path.name for path in Path().
     assert told[-1] in ("pddl", "pddl/domain.pddl"), done.stderr
 
 
-def test_a_rename_waits_for_whoever_writes_and_says_so(
+def test_a_rename_waits_for_another_writer_and_reports_it(
     tmp_path: Path, tearoom: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     memory, file, link = Memory.of(confab.load(tearoom)), tmp_path / "m.ttl", tmp_path / "link" / "m.ttl"
@@ -254,7 +254,7 @@ def test_a_rename_waits_for_whoever_writes_and_says_so(
 
 
 @pytest.mark.parametrize("rename", ["B1_WASH=a b", "B1_WASH=", "=", "B1_WASH=http://[x", "x=y"])
-def test_a_rename_to_what_is_no_name_changes_nothing(tmp_path: Path, tearoom: Path, ask: Ask, rename: str) -> None:
+def test_a_rename_to_an_invalid_name_changes_nothing(tmp_path: Path, tearoom: Path, ask: Ask, rename: str) -> None:
     memory, file = Memory.of(confab.load(tearoom)), tmp_path / "m.ttl"
     memory.experience = lived("me")
     memory.save(file)
@@ -303,7 +303,7 @@ def test_xml_that_reads_files_or_grows_is_refused(
     assert said in out + err
 
 
-def test_plain_entities_still_abbreviate(tmp_path: Path) -> None:
+def test_plain_xml_entities_are_still_expanded(tmp_path: Path) -> None:
     text = BODY.replace("https://x.org/", "&i;")
     (tmp_path / "s.owl").write_text(f'<!DOCTYPE rdf:RDF [<!ENTITY i "https://x.org/" >]>{HEAD}{text}')
     assert confab.load(tmp_path / "s.owl").iri == "https://x.org/s"
@@ -358,7 +358,7 @@ def test_plain_entities_still_abbreviate(tmp_path: Path) -> None:
         ("", ":B1_CARRY.free ;", ":N . :N a c:AnyOf ; c:alternative :N . :B1_CARRY", "the condition contains itself"),
     ],
 )
-def test_a_scene_that_cannot_be_meant_is_refused_in_one_line_by_plan_and_validate(
+def test_an_invalid_scene_is_refused_in_one_line_by_plan_and_by_validate(
     tearoom: Path, ask: Ask, file: str, old: str, new: str, said: str
 ) -> None:
     change(tearoom.with_name(f"tearoom{file}.ttl"), old, new)
@@ -378,7 +378,7 @@ def test_a_goal_about_too_few_individuals_is_refused(tmp_path: Path, ask: Ask) -
 
 
 @pytest.mark.parametrize("command", ["plan", "execute", "explain", "export -o out"])
-def test_a_scene_in_which_nothing_can_be_done_is_refused(
+def test_a_scene_without_behaviours_is_refused(
     tearoom: Path, ask: Ask, monkeypatch: pytest.MonkeyPatch, command: str
 ) -> None:
     monkeypatch.chdir(tearoom.parent)
@@ -391,7 +391,7 @@ def test_a_scene_in_which_nothing_can_be_done_is_refused(
     assert not Path("out").exists()
 
 
-def test_an_amount_that_is_no_situation_type_is_refused(tmp_path: Path, ask: Ask) -> None:
+def test_an_amount_that_is_not_declared_as_a_situation_type_is_refused(tmp_path: Path, ask: Ask) -> None:
     scene = tmp_path / "canteen-small.ttl"
     scene.write_text(shipped_scenes()["canteen-small"].read_text())
     (tmp_path / "canteen.ttl").write_text((ROOT / "domains/canteen.ttl").read_text())
@@ -407,7 +407,7 @@ def test_an_amount_that_is_no_situation_type_is_refused(tmp_path: Path, ask: Ask
     assert "canteen#BATTERY> isn't a situation type; declare it as one" in err
 
 
-def test_what_follows_from_axioms_about_a_property_has_an_owner(tmp_path: Path, ask: Ask) -> None:
+def test_a_situation_type_that_follows_from_axioms_needs_a_class_that_has_it(tmp_path: Path, ask: Ask) -> None:
     for name, file in (("gallery", "domains/gallery.ttl"), ("scene", "scenes/gallery-small.ttl")):
         (tmp_path / f"{name}.ttl").write_text((ROOT / file).read_text())
     change(tmp_path / "gallery.ttl", "c:hasSituationType :JOINED, :WAY", "c:hasSituationType :JOINED")
@@ -420,7 +420,7 @@ def test_what_follows_from_axioms_about_a_property_has_an_owner(tmp_path: Path, 
     assert "WAY follows from axioms about its value property" in err
 
 
-def test_conditions_may_be_nested_but_not_for_ever(tearoom: Path, ask: Ask) -> None:
+def test_conditions_may_be_nested_to_a_maximum_depth(tearoom: Path, ask: Ask) -> None:
     domain = tearoom.with_name("tearoom.ttl")
     change(domain, "c:precondition :B1_CARRY.free", "c:precondition :B1_CARRY.free, :N0")
     text = domain.read_text()
@@ -434,7 +434,7 @@ def test_conditions_may_be_nested_but_not_for_ever(tearoom: Path, ask: Ask) -> N
         assert ask("plan", tearoom)[0] == code
 
 
-def test_long_chains_and_circles_of_classes_are_taken_everywhere(tmp_path: Path, tearoom: Path, ask: Ask) -> None:
+def test_all_commands_handle_long_chains_and_circles_of_classes(tmp_path: Path, tearoom: Path, ask: Ask) -> None:
     chain = "".join(f":K{i} a owl:Class ; rdfs:subClassOf :K{i + 1} .\n" for i in range(1000))
     domain = tearoom.with_name("tearoom.ttl")
     text = domain.read_text()
@@ -456,7 +456,7 @@ def test_classes_may_have_any_name(tearoom: Path, ask: Ask, name: str) -> None:
     assert ask("plan", tearoom)[0] == YES
 
 
-def test_dollars_in_labels_are_drawn(tmp_path: Path, tearoom: Path, ask: Ask) -> None:
+def test_dollar_signs_in_labels_are_drawn(tmp_path: Path, tearoom: Path, ask: Ask) -> None:
     change(tearoom.with_name("tearoom.ttl"), '"the item is dirty"', '"costs $5 or \\\\frac$"')
     assert ask("picture", tearoom, "--behavior", "B1_WASH", "-o", tmp_path / "a.svg")[0] == YES
 
@@ -481,7 +481,7 @@ STEPS = '{"steps": [' + STEP
         ("\ufeff", "not JSON"),
     ],
 )
-def test_a_plan_that_is_none_is_refused_in_one_line(
+def test_a_text_that_is_no_plan_is_refused_in_one_line(
     tmp_path: Path, tearoom: Path, ask: Ask, text: str, said: str
 ) -> None:
     (tmp_path / "plan.json").write_text(text)
@@ -506,7 +506,7 @@ def test_files_may_have_any_name(tmp_path: Path, tearoom: Path, ask: Ask, monkey
     "url", ["http://[bad", "http://[::1", "https://", "http://x y/", "http://x:99999999/", "http://\x1b"]
 )
 @pytest.mark.parametrize("command", ["plan", "fetch"])
-def test_an_address_that_is_none_is_refused_in_one_line(tmp_path: Path, ask: Ask, command: str, url: str) -> None:
+def test_an_invalid_address_is_refused_in_one_line(tmp_path: Path, ask: Ask, command: str, url: str) -> None:
     code, _, err = ask(command, url, *(["--into", tmp_path] if command == "fetch" else []))
     assert (code, err.count("\n")) == (MISUSE, 1)
 
@@ -534,13 +534,15 @@ CROSS = "SELECT * WHERE { ?a ?b ?c . ?d ?e ?f . ?g ?h ?i }"
         ("SELECT * WHERE { service <http://127.0.0.1:9/> { ?a ?b ?c } }", [], MISUSE, "asks another endpoint"),
     ],
 )
-def test_a_query_harms_nothing_but_itself(ask: Ask, query: str, more: list[str], code: int, said: str) -> None:
+def test_a_harmful_query_is_ended_with_one_line_and_harms_nothing_else(
+    ask: Ask, query: str, more: list[str], code: int, said: str
+) -> None:
     got, out, err = ask("query", "beverage-serving", query, *more)
     assert (got, out, err.count("\n")) == (code, "", 1)
     assert said in err
 
 
-def test_no_query_reaches_another_endpoint_unless_asked(tmp_path: Path) -> None:
+def test_no_query_reaches_another_endpoint_unless_the_user_allows_it(tmp_path: Path) -> None:
     """A query that the check of keywords accepts still can't open a connection, unless the user allows it."""
     import http.server
 
@@ -572,7 +574,7 @@ def test_no_query_reaches_another_endpoint_unless_asked(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ['"SERVICE"', "<urn:SERVICE>", "?service", ":SERVICE", "'''a\nSERVICE'''"])
-def test_the_word_service_may_be_spoken_of(text: str) -> None:
+def test_the_word_service_is_allowed_in_texts_and_names_of_a_query(text: str) -> None:
     from confab.reasoner.graph.query_process import SERVICE, TEXTS
 
     assert SERVICE.search(TEXTS.sub(" ", f"SELECT * {{ ?a ?b {text} }}")) is None
@@ -581,7 +583,7 @@ def test_the_word_service_may_be_spoken_of(text: str) -> None:
 # ------------------------------------------------------------------------------------------ checks of input
 
 
-def test_a_fault_of_ours_is_one_line_with_a_log(ask: Ask, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_internal_error_gives_one_line_and_a_log(ask: Ask, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: object, **__: object) -> NoReturn:
         raise KeyError("no\nsuch\x1b[2J thing")
 
@@ -633,7 +635,7 @@ def test_no_control_character_is_echoed(ask: Ask) -> None:
     assert "\\x1b" in err
 
 
-def test_json_stays_json(tmp_path: Path, tearoom: Path, ask: Ask) -> None:
+def test_json_output_contains_only_standard_json_numbers(tmp_path: Path, tearoom: Path, ask: Ask) -> None:
     code, out, _ = ask("plan", tearoom, "--optimal", "--json")
     assert code == YES
     json.loads(out, parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))
@@ -650,7 +652,7 @@ def test_the_time_limit_holds_from_the_first_step_on(tmp_path: Path, ask: Ask, m
     assert re.search("gave up after 0.05 s while .*--time-limit", err)
 
 
-def test_a_step_that_nothing_interrupts_is_broken_off_a_tenth_after_the_time_limit(
+def test_an_uninterruptible_step_is_ended_shortly_after_the_time_limit(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     codes: list[int] = []
@@ -665,7 +667,9 @@ def test_a_step_that_nothing_interrupts_is_broken_off_a_tenth_after_the_time_lim
     assert codes == [GAVE_UP]
 
 
-def test_no_look_for_faults_outlasts_the_time_limit(tearoom: Path, ask: Ask, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_check_of_a_scene_before_planning_keeps_the_time_limit(
+    tearoom: Path, ask: Ask, monkeypatch: pytest.MonkeyPatch
+) -> None:
     looked = []
 
     def slowly(graph: KnowledgeGraph) -> NoReturn:
@@ -677,7 +681,7 @@ def test_no_look_for_faults_outlasts_the_time_limit(tearoom: Path, ask: Ask, mon
     assert looked == [60.0]
 
 
-def test_a_deadline_ends_with_the_call_that_it_was_given_to(tearoom: Path) -> None:
+def test_a_time_limit_applies_only_to_its_own_call(tearoom: Path) -> None:
     scene = confab.load(tearoom)
     with pytest.raises(LimitError, match="gave up after 1e-09 s"):
         scene.plan(time_limit=1e-9)
@@ -687,7 +691,7 @@ def test_a_deadline_ends_with_the_call_that_it_was_given_to(tearoom: Path) -> No
         confab.load(tearoom)
 
 
-def test_a_fact_about_nobody_is_refused(tmp_path: Path, ask: Ask) -> None:
+def test_a_fact_without_an_individual_is_refused(tmp_path: Path, ask: Ask) -> None:
     scene = tmp_path / "ferry.ttl"
     scene.write_text((Path(__file__).parents[2] / "docs" / "examples" / "ferry" / "ferry.ttl").read_text())
     change(scene, "c:situationType :MOORED ; c:about :west .", "c:situationType :MOORED .")
@@ -696,7 +700,7 @@ def test_a_fact_about_nobody_is_refused(tmp_path: Path, ask: Ask) -> None:
     assert "a fact about 0 individuals; MOORED is about 1" in err
 
 
-def test_without_pybullet_all_but_physics_works_and_that_says_so(tmp_path: Path) -> None:
+def test_without_pybullet_all_but_physics_works_and_physics_reports_it(tmp_path: Path) -> None:
     new_domain("pouring", tmp_path / "p", bodies=True)
     scene, plan = tmp_path / "p" / "pouring-scene.ttl", tmp_path / "plan.json"
     confab.load(scene).plan().save(plan)
@@ -752,7 +756,7 @@ except PermissionError:
     assert 'src="http' not in (tmp_path / "report.html").read_text()
 
 
-def test_ctrl_c_before_everything_is_imported_is_one_line() -> None:
+def test_ctrl_c_during_imports_gives_one_line() -> None:
     code = """
 import os, signal, sys
 class Impatient:
@@ -780,7 +784,7 @@ main()
         ("serve living-room --port 0", "socket:create_server"),
     ],
 )
-def test_ctrl_c_is_one_line_and_leaves_nothing_half_done(tmp_path: Path, command: str, moment: str) -> None:
+def test_ctrl_c_gives_one_line_and_leaves_no_partial_file(tmp_path: Path, command: str, moment: str) -> None:
     code = """
 import os, pkgutil, signal, sys
 owner, _, name = sys.argv.pop(1).replace(":", ".").rpartition(".")
@@ -806,7 +810,7 @@ main()
     assert not list(tmp_path.rglob("*.*"))
 
 
-def test_ctrl_c_is_one_though_a_library_makes_another_error_of_it(capsys: pytest.CaptureFixture[str]) -> None:
+def test_ctrl_c_is_recognised_even_if_a_library_raises_another_error(capsys: pytest.CaptureFixture[str]) -> None:
     def call() -> NoReturn:
         try:
             os.kill(os.getpid(), signal.SIGINT)

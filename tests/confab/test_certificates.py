@@ -25,9 +25,7 @@ def proof(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
-def test_a_saved_certificate_holds_and_nothing_is_searched_for_that(
-    proof: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_saved_certificate_is_checked_without_a_search(proof: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for module, name in ((planner, "plan"), (certifying, "certify")):
         monkeypatch.setattr(module, name, None)
     told = CliRunner().invoke(app, ["explain", "beverage-serving", *GOAL, "--check", str(proof)])
@@ -35,7 +33,7 @@ def test_a_saved_certificate_holds_and_nothing_is_searched_for_that(
     assert told.stdout.startswith("the certificate holds: there is no plan")
 
 
-def test_a_certificate_of_another_task_or_one_that_was_changed_is_not_accepted(proof: Path, tmp_path: Path) -> None:
+def test_a_certificate_of_another_task_and_a_changed_certificate_are_rejected(proof: Path, tmp_path: Path) -> None:
     told = CliRunner().invoke(app, ["explain", "beverage-serving", "--check", str(proof)])
     assert told.exit_code == 1
     assert "not accepted: left_hand HAND_POSITION location8 isn't wanted in this task" in told.stdout
@@ -50,7 +48,7 @@ def test_a_certificate_of_another_task_or_one_that_was_changed_is_not_accepted(p
 @pytest.mark.parametrize(
     "text", ["{}", "[]", "{", '{"status": "solved", "steps": []}', '{"certificate": null}', "[" * 100_000]
 )
-def test_what_holds_no_certificate_is_misuse(text: str, tmp_path: Path) -> None:
+def test_a_file_without_a_certificate_is_misuse(text: str, tmp_path: Path) -> None:
     file = tmp_path / "none.json"
     file.write_text(text)
     told = CliRunner().invoke(app, ["explain", "beverage-serving", "--check", str(file)])

@@ -36,7 +36,7 @@ def test_plan_prints_the_tree_with_ids() -> None:
     assert "22 B1_MOVE cup1 location7" in done.stdout
 
 
-def test_a_plan_is_the_same_tree_in_a_pipe_as_in_a_terminal() -> None:
+def test_a_plan_is_printed_as_the_same_tree_in_a_pipe_and_in_a_terminal() -> None:
     result = load("beverage-serving").plan()
     plain, shown = StringIO(), StringIO()
     Console(file=plain, width=200).print(result)
@@ -47,12 +47,12 @@ def test_a_plan_is_the_same_tree_in_a_pipe_as_in_a_terminal() -> None:
     ]
 
 
-def test_a_plan_is_drawn_into_a_pipe_line_by_line_which_takes_time_that_grows_with_its_length() -> None:
+def test_a_plan_is_printed_into_a_pipe_line_by_line() -> None:
     pieces = Console(file=StringIO(), width=200).render(load("beverage-serving").plan())
     assert max(piece.text.count("\n") for piece in pieces) == 1
 
 
-def test_once_the_limit_is_over_a_plan_command_looks_for_nothing_more_to_say(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_plan_command_adds_no_advice_on_reach_after_its_time_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = load("beverage-serving")
     monkeypatch.setattr("confab.reaching.unreached", lambda _: pytest.fail("reach is looked at after the limit"))
     blame_reach(scene, Outcome(Status.GAVE_UP, None), Deadline.after(0.0))
@@ -158,19 +158,19 @@ def test_plan_needs_neither_rdflib_nor_physics_nor_reasoners() -> None:
     assert done.stdout.strip() == "[]"
 
 
-def test_what_a_command_does_fits_into_its_line_of_the_help() -> None:
+def test_the_description_of_each_command_fits_into_its_line_of_the_help() -> None:
     done = confab("--help", COLUMNS="80")
     assert done.returncode == 0
     assert not [line for line in done.stdout.splitlines()[1:] if line.endswith("...")]
 
 
-def test_where_there_is_no_terminal_a_long_run_says_what_it_does(tmp_path: Path) -> None:
+def test_a_long_run_without_a_terminal_prints_its_stages(tmp_path: Path) -> None:
     done = confab("run", "two-places", cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr.splitlines()[0] == "confab: validating"
 
 
-def test_empty_files_of_facts_and_memories_are_told(tmp_path: Path) -> None:
+def test_empty_fact_files_and_memories_are_reported(tmp_path: Path) -> None:
     (tmp_path / "empty.ttl").touch()
     done = confab("plan", "beverage-serving", "--memory", "empty.ttl", cwd=tmp_path)
     assert "holds no memory" in done.stderr

@@ -65,7 +65,7 @@ def test_every_command_has_examples_in_its_help(run: CliRunner) -> None:
 
 
 @pytest.mark.parametrize("line", [line for lines in EXAMPLES.values() for line in lines if line.startswith("confab")])
-def test_every_example_is_a_call_that_can_be_made(run: CliRunner, line: str) -> None:
+def test_every_example_in_the_help_is_a_valid_call(run: CliRunner, line: str) -> None:
     words = shlex.split(line)[1:]
     if any(word in line for word in SLOW):
         name = next(name for name in commands() if f"{line} ".startswith(f"confab {name} "))
@@ -75,7 +75,7 @@ def test_every_example_is_a_call_that_can_be_made(run: CliRunner, line: str) -> 
 
 
 @pytest.mark.parametrize("option", ["-o", "--output"])
-def test_output_means_the_same_everywhere(run: CliRunner, option: str) -> None:
+def test_the_output_option_has_the_same_meaning_in_all_commands(run: CliRunner, option: str) -> None:
     for name, command in commands().items():
         for parameter in command.params:
             if {"--out", "--folder", "--into", "--save", "-o", "--output"} & {*parameter.opts}:
@@ -94,14 +94,14 @@ def test_a_scene_without_bodies_is_run_without_physics(run: CliRunner) -> None:
     assert list(Path().iterdir()) == [Path("out")]
 
 
-def test_a_run_learns_into_the_file_that_is_named_and_nowhere_else(run: CliRunner) -> None:
+def test_a_run_learns_only_into_the_named_memory_file(run: CliRunner) -> None:
     for times in (1, 2):
         assert run.invoke(app, ["run", "towers-small", "-o", "out", "--memory", "mine.ttl"]).exit_code == 0
         assert sum(confab.Memory.load("mine.ttl").experience.episodes.values()) == times
     assert not Path("out/memory.ttl").exists()
 
 
-def test_planning_says_in_one_line_what_validation_would_find(run: CliRunner, tmp_path: Path) -> None:
+def test_planning_refers_in_one_line_to_errors_that_validation_finds(run: CliRunner, tmp_path: Path) -> None:
     new_domain("tearoom", tmp_path)
     file = tmp_path / "tearoom-scene.ttl"
     assert run.invoke(app, ["plan", str(file)]).stderr == ""
@@ -116,12 +116,12 @@ def test_planning_says_in_one_line_what_validation_would_find(run: CliRunner, tm
     assert run.invoke(app, ["plan", str(file)]).stderr != ""
 
 
-def test_a_misspelt_scene_is_answered_with_the_nearest(run: CliRunner) -> None:
+def test_the_message_on_a_misspelt_scene_names_the_most_similar_scene(run: CliRunner) -> None:
     told = run.invoke(app, ["plan", "beverage-servin"])
     assert "did you mean 'beverage-serving'" in str(told.exception)
 
 
-def test_a_folder_or_a_name_without_its_ending_is_answered_with_the_file(run: CliRunner) -> None:
+def test_the_message_on_a_folder_or_a_name_without_suffix_names_the_scene_file(run: CliRunner) -> None:
     new_domain("tearoom", Path("tearoom"))
     for given in ("tearoom", "tearoom/tearoom-scene"):
         assert "did you mean 'tearoom/tearoom-scene.ttl'?" in str(run.invoke(app, ["plan", given]).exception)
@@ -143,7 +143,7 @@ def test_the_tab_key_completes_scenes_and_files(tmp_path: Path) -> None:
     assert completed == ["beverage-serving-moved", "beverage-serving", "beverages.ttl"]
 
 
-def test_no_colour_is_no_colour() -> None:
+def test_output_with_no_color_has_no_colours() -> None:
     command = [sys.executable, "-c", "from confab.cli import main; main()", "plan", "towers-small"]
     texts = [
         subprocess.run(
@@ -155,7 +155,7 @@ def test_no_colour_is_no_colour() -> None:
     assert b"36m" not in texts[1].stdout
 
 
-def test_what_takes_long_shows_how_much_time_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_long_command_shows_its_remaining_time(monkeypatch: pytest.MonkeyPatch) -> None:
     class Terminal(io.StringIO):
         def isatty(self) -> bool:
             return True
@@ -176,7 +176,7 @@ def test_what_takes_long_shows_how_much_time_is_left(monkeypatch: pytest.MonkeyP
     assert pipe.getvalue() == ""
 
 
-def test_validation_can_go_on_while_one_edits(tmp_path: Path) -> None:
+def test_validation_with_watch_runs_again_after_each_edit(tmp_path: Path) -> None:
     new_domain("tearoom", tmp_path)
     domain, scene = tmp_path / "tearoom.ttl", tmp_path / "tearoom-scene.ttl"
     command = [sys.executable, "-c", "from confab.cli import main; main()", "validate", str(scene), "--watch"]

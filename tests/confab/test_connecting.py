@@ -74,7 +74,7 @@ def run(scene: Scene, fault: Fault, seconds: float = 5.0) -> tuple[Execution, Ro
 # ------------------------------------------------------------------------------------------------------------- interfaces
 
 
-def test_a_robot_is_planned_for_and_driven_by_what_turtle_says_of_its_interface(rover: Scene) -> None:
+def test_a_robot_is_driven_by_an_interface_that_is_described_in_turtle(rover: Scene) -> None:
     with served(robot := Robot()) as address:
         done = rover.execute(world=f"rover:{address}")
     assert done.reached
@@ -96,7 +96,7 @@ def test_a_robot_that_keeps_to_the_protocol_passes_every_check(rover: Scene) -> 
     assert found["effects"].passed
 
 
-def test_a_lie_about_an_effect_is_found_and_not_believed(rover: Scene) -> None:
+def test_a_false_report_of_an_effect_is_detected_and_not_believed(rover: Scene) -> None:
     def lies(action: str, arguments: dict[str, str]) -> str:
         return "lie" if action == "grab" else ""
 
@@ -132,7 +132,7 @@ def test_the_deadline_of_a_call_stops_an_action_that_hangs(rover: Scene) -> None
     assert not done.reached
 
 
-def test_answers_that_say_nothing_are_failures_with_a_code(rover: Scene) -> None:
+def test_invalid_answers_of_a_robot_are_failures_with_a_code(rover: Scene) -> None:
     for wrong, code in (("half", "no answer"), ("garbage", "unknown answer"), ("refuse", "refused")):
         once = iter([wrong])
         done, _ = run(rover, lambda *_, once=once: next(once, ""))
@@ -148,7 +148,7 @@ def test_a_world_model_that_cannot_be_read_ends_the_episode_with_its_reason(rove
     assert "no JSON" in done.summary()
 
 
-def test_what_the_model_names_and_the_scene_does_not_know_is_left_out(rover: Scene) -> None:
+def test_facts_of_the_world_model_with_unknown_names_are_left_out(rover: Scene) -> None:
     with acting(rover, fine) as (world, robot):
         robot.where["ball"] = "moon"
         robot.at = 17  # type: ignore[assignment]
@@ -157,7 +157,7 @@ def test_what_the_model_names_and_the_scene_does_not_know_is_left_out(rover: Sce
     assert any("book" in symbol for symbol in seen)
 
 
-def test_of_many_actions_with_random_faults_none_hangs_and_none_is_believed_unseen(rover: Scene) -> None:
+def test_actions_with_random_faults_never_hang_and_succeed_only_if_observed(rover: Scene) -> None:
     """Each verdict is compared with the robot's actions.
 
     A success is reported only if it is true, and all observed facts are true.
@@ -189,7 +189,7 @@ def test_of_many_actions_with_random_faults_none_hangs_and_none_is_believed_unse
     assert {*faults} == {*wrong, ""}
 
 
-def test_with_random_faults_an_episode_claims_only_what_is_so(rover: Scene) -> None:
+def test_an_episode_with_random_faults_reports_its_goal_as_reached_only_if_it_is(rover: Scene) -> None:
     draw = random.Random(41)
     for _ in range(3):
         done, robot = run(rover, lambda *_: draw.choice(["half", "lie", "refuse", *[""] * 12]))
@@ -197,7 +197,7 @@ def test_with_random_faults_an_episode_claims_only_what_is_so(rover: Scene) -> N
         assert done.reached == there, done.summary()
 
 
-def test_an_interface_that_is_not_there_or_lacks_an_action_is_refused_by_name(rover: Scene, tmp_path: Path) -> None:
+def test_a_missing_interface_or_an_interface_without_an_action_is_refused_by_name(rover: Scene, tmp_path: Path) -> None:
     for on, said in (
         ("rovr:http://x", "did you mean 'rover'"),
         (":http://x", "INTERFACE:ADDRESS"),
@@ -222,7 +222,7 @@ s:Chest-5 a s:Location ; rdfs:label "chest" ; s:Open false .
 cora:Robot-7 a cora:Robot ; rdfs:label "robi" ; s:at s:Room-1 ; s:BatteryPercentage "100"^^xsd:float ."""
 
 
-def test_a_scene_of_another_ontology_is_imported_by_a_query_and_planned_in(tmp_path: Path) -> None:
+def test_a_scene_of_another_ontology_is_imported_by_a_query_and_has_a_plan(tmp_path: Path) -> None:
     (tmp_path / "foreign.turtle").write_text(SKIROS)
     count = scene_of_graph(tmp_path / "foreign.turtle", "rooms-from-skiros.rq", tmp_path / "scene.ttl")
     assert count > 10
@@ -313,7 +313,7 @@ def test_interventions_are_refused_before_a_robot_moves(rover: Scene) -> None:
     assert robot.called == 0
 
 
-def test_a_value_that_the_scene_does_not_have_ends_the_episode_by_name() -> None:
+def test_an_unknown_observed_value_ends_the_episode_with_its_name() -> None:
     problem = confab.load("beverage-serving").problem
 
     class Odd(SymbolicWorld):
@@ -332,7 +332,7 @@ def test_a_value_that_the_scene_does_not_have_ends_the_episode_by_name() -> None
     assert check_world(Odd(problem), problem)["symbols"].passed is False
 
 
-def test_a_stop_that_is_never_forgotten_and_a_step_that_always_fails_fail_the_test() -> None:
+def test_a_world_that_stays_stopped_or_always_fails_a_step_fails_the_conformance_test() -> None:
     problem = confab.load("beverage-serving").problem
 
     class Stopped(SymbolicWorld):
@@ -357,7 +357,7 @@ def test_a_stop_that_is_never_forgotten_and_a_step_that_always_fails_fail_the_te
     assert "B3_GRASP left_hand, which failed 5 times: slipped" in found["execution"].found
 
 
-def test_a_robot_that_ignores_being_cancelled_is_said_to_go_on(rover: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_robot_that_ignores_a_cancellation_is_reported(rover: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("confab.sim.robots.adapter.GRACE", 0.2)
     with acting(rover, lambda *_: "hang", seconds=60.0) as (world, _):
         monkeypatch.setattr(world.transport, "cancel", lambda: None)
@@ -366,7 +366,7 @@ def test_a_robot_that_ignores_being_cancelled_is_said_to_go_on(rover: Scene, mon
     assert "not stopped" in found["cancellation"].found
 
 
-def test_a_world_that_does_not_stop_or_goes_backwards_fails_the_test() -> None:
+def test_a_world_that_does_not_stop_or_whose_clock_runs_backwards_fails_the_conformance_test() -> None:
     problem = confab.load("beverage-serving").problem
 
     class Stubborn(SymbolicWorld):

@@ -112,7 +112,7 @@ def checked(path: Path) -> Counter[str]:
     return remote.counts
 
 
-def test_the_check_of_a_plan_reads_nothing_of_what_is_irrelevant(tmp_path: Path) -> None:
+def test_the_check_of_a_plan_reads_no_irrelevant_objects(tmp_path: Path) -> None:
     path = tmp_path / "scene.ttl"
     write_scene(path, "served")
     alone = checked(path)
@@ -122,7 +122,7 @@ def test_the_check_of_a_plan_reads_nothing_of_what_is_irrelevant(tmp_path: Path)
 
 
 @pytest.mark.parametrize("goals", [(), ("cup1 LOCATION location3",)])
-def test_recognition_reads_nothing_of_what_is_irrelevant(tmp_path: Path, goals: tuple[str, ...]) -> None:
+def test_recognition_reads_no_irrelevant_objects(tmp_path: Path, goals: tuple[str, ...]) -> None:
     """A task among 20,000 irrelevant objects needs the same numbers of queries, rows, bytes and triples as the task alone."""
     path = tmp_path / "scene.ttl"
     write_scene(path, "served")
@@ -133,9 +133,7 @@ def test_recognition_reads_nothing_of_what_is_irrelevant(tmp_path: Path, goals: 
         assert counted(path, goals) == alone
 
 
-def test_a_query_that_looks_at_whoever_has_such_a_name_is_noticed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_query_for_all_individuals_with_a_name_is_detected(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Commit 40b5436 had this fault: a query for individuals with the same name read all individuals."""
 
     def namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member]) -> set[str]:
@@ -153,7 +151,7 @@ def test_a_query_that_looks_at_whoever_has_such_a_name_is_noticed(
     assert all(among[what] > alone[what] + 100 for what in ("rows", "bytes", "looked"))
 
 
-def test_a_call_asks_the_store_few_questions() -> None:
+def test_a_call_sends_few_queries_to_the_store() -> None:
     """Loading takes two queries and one per file; recognition takes six, the check takes two, and a changed goal takes one more."""
     scene = confab.load("beverage-serving")
     assert scene.knowledge.round_trips == 2 + len(scene.knowledge.files)
@@ -161,7 +159,7 @@ def test_a_call_asks_the_store_few_questions() -> None:
     assert scene.plan(["cup1 BEVERAGE no_beverage"]).queries == 7 + 2
 
 
-def test_a_no_reads_the_schema_once(tmp_path: Path) -> None:
+def test_an_unsolvable_answer_takes_three_additional_queries(tmp_path: Path) -> None:
     """Three queries read the individuals that were left out: their types, their facts, and facts in separate nodes."""
     write_scene(tmp_path / "scene.ttl", "unsolvable", clutter=10)
     scene = confab.load(tmp_path / "scene.ttl")
@@ -226,7 +224,7 @@ def test_the_plan_command_imports_what_it_needs() -> None:
     assert own(modules) <= MOST_OWN
 
 
-def test_what_it_doesnt_need_is_noticed() -> None:
+def test_the_import_of_an_unneeded_module_is_detected() -> None:
     modules = imported("import rdflib, confab.planner.grounded.task")
     assert {name for name in modules if name in UNWANTED} >= {"rdflib", "confab.planner.grounded"}
     assert len(modules) - own(modules) > MOST_MODULES

@@ -72,7 +72,7 @@ def test_ten_episodes_predict_the_eleventh_within_its_spread() -> None:
     assert abs(sum(errors)) <= 2 * sum(one.spread**2 for one in predicted) ** 0.5
 
 
-def test_the_speed_of_a_second_actor_is_learned_apart_and_used_in_the_schedule() -> None:
+def test_the_speed_of_each_actor_is_learned_separately_and_used_in_the_schedule() -> None:
     memory = learned(range(10))
     known = memory.statistics
     both = {name for name, actor in known if actor == "left_hand" and (name, "right_hand") in known}

@@ -52,14 +52,14 @@ def test_an_engines_plan_stands_under_the_levels_above_and_is_valid() -> None:
     assert at_rest(problem, 3).keys() and not at_rest(problem, 1)
 
 
-def test_the_levels_that_an_engines_plan_leaves_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_levels_that_the_plan_of_an_engine_leaves_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(engines, "under_the_levels_above", lambda _, plan: plan)
     outcome = plan_by_engine(confab.load(SCENE).problem, "stand-in")
     assert outcome.plan is not None and {step.level for step in outcome.plan.steps} != {1}
     assert {one.level for one in outcome.left} == {1, 2}
 
 
-def test_a_level_of_ones_choice_is_planned() -> None:
+def test_an_engine_plans_the_chosen_level() -> None:
     outcome = plan_by_engine(confab.load(SCENE).problem, "stand-in", 2)
     assert outcome.plan is not None and 3 not in outcome.plan.length
     with pytest.raises(KnowledgeError, match=r"no level 7; this scene has 1, 2, 3"):
@@ -75,7 +75,7 @@ def test_a_level_of_ones_choice_is_planned() -> None:
         ("SOLVED_SATISFICING", Status.GAVE_UP, "e: its plan is invalid: the goal"),
     ],
 )
-def test_what_is_no_plan_is_said_to_be_none(
+def test_answers_of_an_engine_without_a_valid_plan_are_reported_with_the_reason(
     monkeypatch: pytest.MonkeyPatch, said: str, status: Status, reason: str
 ) -> None:
     monkeypatch.setattr(engines, "answer", lambda *_: ("e", said, []))
@@ -84,7 +84,7 @@ def test_what_is_no_plan_is_said_to_be_none(
     assert outcome.reason.text.startswith(reason)
 
 
-def test_installed_engines_are_tried_where_ours_gives_up(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_installed_engine_runs_if_the_own_search_gives_up(monkeypatch: pytest.MonkeyPatch) -> None:
     gave_up = Outcome(Status.GAVE_UP, reason=Reason("the limit came first"))
     monkeypatch.setattr("confab.planner.hierarchical.planner.plan", lambda *_, **__: gave_up)
     scene = confab.load(SCENE)
@@ -98,7 +98,7 @@ def test_installed_engines_are_tried_where_ours_gives_up(monkeypatch: pytest.Mon
         assert outcome.reason == Reason(f"the limit came first; an installed engine was asked {when}: e: timeout")
 
 
-def test_without_a_time_limit_an_engine_is_asked_after_bounded_work_and_ours_goes_on_where_it_finds_nothing(
+def test_without_a_time_limit_an_engine_runs_after_bounded_work_and_own_search_continues_if_it_fails(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("confab.planning.OURS_WORK", 0)
@@ -142,7 +142,7 @@ def test_fast_downward_plans_the_lowest_level(monkeypatch: pytest.MonkeyPatch, s
     assert validate(problem, outcome.plan) == []
 
 
-def test_unified_plannings_reader_takes_action_costs_and_what_it_cannot_read_is_said(
+def test_unified_planning_reads_action_costs_and_unreadable_levels_are_reported(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     pytest.importorskip("unified_planning", reason="needs the extra 'pddl'")
@@ -160,7 +160,9 @@ def test_unified_plannings_reader_takes_action_costs_and_what_it_cannot_read_is_
         answer("(define (domain d) (:derived (p) (q)))", problem, None, Deadline.after(10.0))
 
 
-def test_what_no_engine_takes_is_said_and_no_time_is_kept_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_level_that_no_engine_supports_is_reported_and_no_time_is_reserved_for_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     pytest.importorskip("up_fast_downward", reason="needs the engine up-fast-downward")
     monkeypatch.undo()
     defined, counted, plain = (confab.load(scene).problem for scene in ("gallery-small", "canteen-small", SCENE))
@@ -172,7 +174,7 @@ def test_what_no_engine_takes_is_said_and_no_time_is_kept_for_it(monkeypatch: py
     assert [some_installed(problem) for problem in (plain, defined, counted)] == [True, False, False]
 
 
-def test_an_engine_that_reads_pddl_takes_what_is_defined(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_engine_that_reads_pddl_plans_with_defined_situation_types(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("up_fast_downward", reason="needs the engine up-fast-downward")
     monkeypatch.undo()
     problem = confab.load("gallery-small").problem
@@ -196,7 +198,7 @@ def test_a_plan_that_an_engine_has_written_by_its_limit_counts() -> None:
     assert engines._directly(slow, "", "", Deadline.after(0.5)) == ("SOLVED_SATISFICING", ["a x", "b y"])
 
 
-def test_which_engine_is_asked_is_said_with_its_limit(
+def test_the_used_engine_is_logged_with_its_time_limit(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     pytest.importorskip("up_fast_downward", reason="needs the engine up-fast-downward")
@@ -206,7 +208,7 @@ def test_which_engine_is_asked_is_said_with_its_limit(
     assert re.search(r"trying the engine fast-downward, for up to [56]\d", caplog.text)
 
 
-def test_what_exporting_takes_is_taken_from_the_engines_time(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_time_of_the_export_counts_towards_the_time_limit_of_the_engine(monkeypatch: pytest.MonkeyPatch) -> None:
     scene, left = confab.load(SCENE), list[float | None]()
     exporting = to_pddl
 

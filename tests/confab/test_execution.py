@@ -47,7 +47,7 @@ def test_interventions_come_from_a_file_too(tmp_path: Path) -> None:
     assert "1 change of plan" in done.stdout
 
 
-def test_interventions_that_never_came_are_said() -> None:
+def test_interventions_whose_step_or_time_never_came_are_reported() -> None:
     never = ["after=999 remove cup2", "at=9999 remove cup2"]
     execution = confab.load("beverage-serving").execute(interventions=never)
     assert execution.reached
@@ -57,7 +57,7 @@ def test_interventions_that_never_came_are_said() -> None:
     )
 
 
-def test_what_has_become_impossible_exits_with_1_and_says_why() -> None:
+def test_an_execution_whose_goal_becomes_impossible_exits_with_1_and_the_reason() -> None:
     done = command("--intervene", "after=28 remove cup2")
     assert done.returncode == 1
     assert "cup2" in done.stdout.splitlines()[0]
@@ -151,7 +151,7 @@ def test_an_episode_is_stored_in_the_terms_of_prov(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("pause", [0.0, 0.25])
-def test_the_change_of_plan_is_told_with_the_interference_whatever_time_the_world_takes(pause: float) -> None:
+def test_a_change_of_plan_is_reported_with_its_intervention_however_slow_the_world_is(pause: float) -> None:
     """In PyBullet, bodies take a quarter of a second to come to rest.
 
     Formerly the change was then reported with the next primitive.
@@ -173,7 +173,7 @@ def ready(name: str) -> str:
     return (ontology.ROOT / "questions" / "episodes" / f"{name}.rq").read_text()
 
 
-def test_where_things_were_is_asked_of_several_saved_episodes_at_once(tmp_path: Path) -> None:
+def test_several_saved_episodes_can_be_queried_together(tmp_path: Path) -> None:
     scene = confab.load("beverage-serving")
     scene.execute().save(tmp_path / "calm.ttl")
     scene.execute(interventions=FIGURE_8).save(tmp_path / "visit.ttl")
@@ -191,7 +191,7 @@ def test_where_things_were_is_asked_of_several_saved_episodes_at_once(tmp_path: 
         both.with_episodes(ontology.ROOT / "scenes" / "two-cups.ttl")
 
 
-def test_the_course_of_an_episode_leads_from_what_was_to_what_is() -> None:
+def test_the_course_of_an_episode_leads_from_the_initial_to_the_observed_state() -> None:
     episode = confab.load("beverage-serving").execute(interventions=FIGURE_8).episode
     state = {**episode.initial}
     for seen in episode.course:
@@ -224,7 +224,7 @@ def test_a_result_is_executed_as_it_was_planned() -> None:
     assert "repair" in execution._repr_html_()
 
 
-def test_any_world_with_observe_and_execute_will_do() -> None:
+def test_any_world_with_observe_and_execute_can_run_an_episode() -> None:
     scene = confab.load("beverage-serving")
     world = SymbolicWorld(scene.problem, {"B3_TILT": 5.0})
     assert execute(scene, scene.problem, world=world).episode.seconds["simulated"] == 40.0
@@ -246,7 +246,7 @@ def test_the_live_view_shows_step_expectation_intervention_and_change() -> None:
     assert "✋" in view._repr_html_()
 
 
-def test_the_terminal_view_takes_every_moment() -> None:
+def test_the_terminal_view_shows_the_events_of_an_episode() -> None:
     console = Console(file=StringIO(), force_terminal=True, width=120)
     with in_terminal(console) as observer:
         confab.load("beverage-serving").execute(interventions=FIGURE_8, observer=observer)

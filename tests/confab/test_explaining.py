@@ -30,27 +30,27 @@ def test_the_weights_add_up_to_the_lead(explanation: Explanation) -> None:
     assert sum(why.weight for why in explanation.reasons) == pytest.approx(explanation.lead)
 
 
-def test_the_rule_is_a_sentence_and_the_episodes_behind_it_are_counted(explanation: Explanation) -> None:
+def test_an_explanation_has_the_rule_as_a_sentence_and_its_numbers_of_episodes(explanation: Explanation) -> None:
     assert explanation.rule.startswith("so that movable LOCATION location, when ")
     assert explanation.rule.endswith("B1_MOVE movable location")
     assert "chosen" in explanation.behind
     assert "taught" in explanation.behind
 
 
-def test_where_memory_has_no_rule_it_says_so(memory: confab.Memory) -> None:
+def test_an_explanation_without_a_rule_in_memory_says_so(memory: confab.Memory) -> None:
     scene = confab.load("beverage-serving")
     told = explain(scene.problem, confab.Memory.of(scene), STEPS)
     assert told.note == "memory has no rule that would do B1_MOVE cup1 location7 there"
 
 
-def test_it_comes_as_text_json_and_picture(explanation: Explanation, tmp_path: Path) -> None:
+def test_an_explanation_is_available_as_text_json_and_picture(explanation: Explanation, tmp_path: Path) -> None:
     assert str(explanation).startswith("B1_MOVE cup1 location7, not B1_POUR bottle1 cup1")
     assert explanation.json()["reasons"][0]["fact"] == explanation.reasons[0].fact
     explanation.plot(tmp_path / "why.png")
     assert (tmp_path / "why.png").stat().st_size > 1000
 
 
-def test_a_step_or_alternative_that_is_not_there_is_a_clear_error(memory: confab.Memory) -> None:
+def test_an_unknown_step_or_an_inapplicable_alternative_is_a_clear_error(memory: confab.Memory) -> None:
     problem = confab.load("beverage-serving").problem
     with pytest.raises(KnowledgeError, match="no step 7"):
         explain(problem, memory, STEPS, 7)

@@ -124,7 +124,7 @@ def test_a_further_first_call_works(
 
 
 @pytest.mark.parametrize(("call", "hint"), SAID.values(), ids=SAID)
-def test_a_first_call_that_fails_says_what_does_it(
+def test_a_failing_first_call_names_the_correct_call(
     scene: confab.Scene, result: confab.Result, call: Callable[[confab.Scene, confab.Result], object], hint: str
 ) -> None:
     with pytest.raises((KnowledgeError, TypeError, KeyError, ValueError)) as told:
@@ -132,7 +132,7 @@ def test_a_first_call_that_fails_says_what_does_it(
     assert hint in str(told.value)
 
 
-def test_thirty_first_calls_are_written_down() -> None:
+def test_the_list_of_first_calls_has_thirty_calls() -> None:
     assert len(CALLS) == 30
 
 
@@ -147,7 +147,7 @@ def test_a_plan_that_was_saved_is_read(scene: confab.Scene, result: confab.Resul
     assert scene.read_plan(result.save(tmp_path / "plan.json")) == result.plan
 
 
-def test_files_of_ones_own_are_read_together_in_any_order(domain: tuple[Path, Path], tmp_path: Path) -> None:
+def test_several_files_are_read_together_in_any_order(domain: tuple[Path, Path], tmp_path: Path) -> None:
     apart = [tmp_path / "a" / domain[0].name, tmp_path / "b" / domain[1].name]
     for file, to in zip(domain, apart, strict=True):
         to.parent.mkdir()
@@ -157,14 +157,14 @@ def test_files_of_ones_own_are_read_together_in_any_order(domain: tuple[Path, Pa
     assert confab.load(apart).plan().solved
 
 
-def test_what_is_no_source_of_a_scene_is_told(scene: confab.Scene) -> None:
+def test_an_invalid_source_of_a_scene_is_refused(scene: confab.Scene) -> None:
     with pytest.raises(KnowledgeError, match="got int; wanted the name of a shipped scene, a file or several"):
         confab.load(3)  # type: ignore[arg-type]
     with pytest.raises(KnowledgeError, match="no file is given"):
         confab.load([])
 
 
-def test_a_scene_is_planned_in_by_another_process_as_here(result: confab.Result, tmp_path: Path) -> None:
+def test_a_pickled_scene_has_the_same_plan_in_another_process(result: confab.Result, tmp_path: Path) -> None:
     (tmp_path / "scene.pickle").write_bytes(pickle.dumps(result.scene))
     code = "import pickle, sys, json; print(json.dumps([str(s) for s in pickle.load(open(sys.argv[1], 'rb')).plan().plan.walk()]))"
     said = subprocess.run(
@@ -173,7 +173,7 @@ def test_a_scene_is_planned_in_by_another_process_as_here(result: confab.Result,
     assert json.loads(said.stdout) == [str(step) for step in result.plan.walk()]
 
 
-def test_an_edit_of_the_graph_is_in_the_copy(scene: confab.Scene) -> None:
+def test_a_copy_of_a_scene_contains_its_changed_facts(scene: confab.Scene) -> None:
     edited = scene.with_fact("cup1 LOCATION location7")
     assert "cup1 LOCATION location7" in copy.deepcopy(edited).facts
     assert copy.deepcopy(edited) is not edited
@@ -204,7 +204,7 @@ WRONG: dict[str, dict[str, str]] = {
 """Sixty names that users of rdflib, owlready2, unified-planning, pyperplan and pandas would guess, each with Confab's name."""
 
 
-def test_of_sixty_wrong_names_all_but_five_at_most_name_what_does_it(
+def test_the_messages_on_sixty_wrong_names_name_the_right_one_except_for_at_most_five(
     scene: confab.Scene, result: confab.Result
 ) -> None:
     of = {"module": confab, "scene": scene, "result": result, "plan": result.plan, "step": result.plan[0]}
@@ -231,13 +231,17 @@ def test_a_step_is_selected_by_its_number_its_path_and_its_words(result: confab.
 
 
 @pytest.mark.parametrize("seconds", [0, -1])
-def test_a_time_limit_is_more_than_nothing(scene: confab.Scene, result: confab.Result, seconds: float) -> None:
+def test_a_time_limit_that_is_not_positive_is_refused(
+    scene: confab.Scene, result: confab.Result, seconds: float
+) -> None:
     for call in (scene.plan, scene.execute, scene.explain, result.verify, result.execute):
         with pytest.raises(KnowledgeError, match=f"time_limit={seconds}; wanted more than 0 seconds"):
             call(time_limit=seconds)
 
 
-def test_for_a_file_at_most_its_own_folder_is_made(scene: confab.Scene, result: confab.Result, tmp_path: Path) -> None:
+def test_writing_a_file_creates_no_missing_parent_folder(
+    scene: confab.Scene, result: confab.Result, tmp_path: Path
+) -> None:
     missing = tmp_path / "typo" / "plan"
     for write, name in (
         (result.save, "p.json"), (result.report, "p.html"), (scene.picture, "p.png"), (scene.execute(result).save, "e.ttl"),
@@ -250,7 +254,9 @@ def test_for_a_file_at_most_its_own_folder_is_made(scene: confab.Scene, result: 
         result.report(tmp_path / "p.pdf")
 
 
-def test_what_has_no_effect_is_refused_with_what_has_one(scene: confab.Scene, result: confab.Result) -> None:
+def test_a_call_without_an_effect_is_refused_with_the_effective_call(
+    scene: confab.Scene, result: confab.Result
+) -> None:
     refused: dict[str, Callable[[], object]] = {
         "scene.with_fact": lambda: scene.facts.append("cup1 LOCATION location7"),
         "is a copy": lambda: scene.objects.update(cup9="Cup"),

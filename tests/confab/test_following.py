@@ -13,7 +13,7 @@ def needs(scene: str | Path, step: str) -> list[str]:
     return list(result.why(step).needs)
 
 
-def test_a_goal_that_is_defined_needs_what_it_follows_from() -> None:
+def test_the_reason_for_a_step_names_the_facts_from_which_a_defined_goal_follows() -> None:
     assert needs("packing-small", "L1#3") == [
         "the goal requires that ring is stored away, which follows from: chest lies in vault"
     ]
@@ -23,12 +23,12 @@ def test_a_goal_that_is_defined_needs_what_it_follows_from() -> None:
     ]
 
 
-def test_a_condition_that_is_defined_is_told_with_what_changed_it() -> None:
+def test_a_defined_condition_is_explained_with_the_fact_that_violated_it_before() -> None:
     asks = "“put ring into casket” (L1#1) requires that casket isn't out of reach; before this step, chest is shut"
     assert asks in needs("packing-small", "L1#0")
 
 
-def test_a_condition_on_all_of_a_class_says_so() -> None:
+def test_a_condition_on_all_members_of_a_class_is_explained_as_such() -> None:
     asked = needs(THEATRE, "unload cloud")
     assert asked[0] == "the goal requires that cloud isn't stowed, which follows from: cart doesn't carry cloud"
     assert re.match(r"“switch (back|front) on” \(L1#15\) requires that no prop is stowed", asked[1])

@@ -32,13 +32,13 @@ def test_the_tab_key_offers_the_public_names_and_nothing_else() -> None:
         assert inspect.getdoc(getattr(confab, name)), name
 
 
-def test_one_goal_can_be_given_as_it_is(scene: confab.Scene, result: confab.Result) -> None:
+def test_a_single_goal_can_be_given_as_a_text(scene: confab.Scene, result: confab.Result) -> None:
     goal = "cup2 LOCATION location8"
     assert scene.plan(goal).plan == scene.plan([goal]).plan != result.plan
     assert scene.execute(goals=goal).reached
 
 
-def test_a_result_an_execution_and_a_file_stand_for_their_plan(
+def test_a_result_an_execution_or_a_file_can_replace_its_plan_as_argument(
     tmp_path: Path, scene: confab.Scene, result: confab.Result
 ) -> None:
     execution = scene.execute(result)
@@ -63,7 +63,7 @@ def test_a_memory_may_be_the_name_of_its_file(tmp_path: Path, scene: confab.Scen
         scene.plan(memory="none.ttl")
 
 
-def test_no_rollouts_are_refused_in_words(scene: confab.Scene, result: confab.Result) -> None:
+def test_a_verification_with_0_rollouts_is_refused_in_one_sentence(scene: confab.Scene, result: confab.Result) -> None:
     with pytest.raises(confab.KnowledgeError, match="0 rollouts can't verify a plan; wanted 1 or more"):
         scene.verify(result, rollouts=0)
 
@@ -77,13 +77,13 @@ def test_facts_and_goals_are_shown_as_they_are_given(scene: confab.Scene) -> Non
 
 
 @pytest.mark.parametrize("name", ["couriers-small", "house-small", "towers-small", "canal-small", "laboratory-small"])
-def test_every_fact_of_any_world_can_be_stated_anew(name: str) -> None:
+def test_every_printed_fact_and_goal_of_a_scene_is_accepted_as_text(name: str) -> None:
     scene = confab.load(name)
     again = scene.with_fact(*scene.facts).with_goal(*scene.goals)
     assert again.problem == scene.problem
 
 
-def test_another_fact_makes_another_scene_and_leaves_the_first(tmp_path: Path, scene: confab.Scene) -> None:
+def test_a_changed_fact_gives_a_new_scene_and_does_not_change_the_first(tmp_path: Path, scene: confab.Scene) -> None:
     moved = scene.with_fact("cup1 LOCATION location7")
     assert moved.query("SELECT ?where WHERE { ?cup k:location ?where FILTER(STRENDS(STR(?cup), 'cup1')) }")[0] == (
         "location7",
@@ -107,7 +107,7 @@ def test_a_scene_without_a_task_can_be_given_a_goal(tmp_path: Path) -> None:
     assert bare.with_goal(first).plan().plan.steps == ()
 
 
-def test_what_is_edited_in_the_rdflib_graph_is_asked_and_planned_with() -> None:
+def test_edits_of_the_rdflib_graph_affect_queries_and_plans() -> None:
     scene = confab.load("beverage-serving")
     graph = scene.graph
     before = len(scene.query(CUPS))
@@ -128,12 +128,12 @@ def test_what_is_edited_in_the_rdflib_graph_is_asked_and_planned_with() -> None:
         graph.add((SERVING.cup1, rdflib.URIRef("no iri"), SERVING.cup1))
 
 
-def test_a_picture_is_an_image_in_a_notebook_and_a_file_where_one_is_named(tmp_path: Path, scene: confab.Scene) -> None:
+def test_a_picture_is_an_image_or_a_file_if_a_file_is_named(tmp_path: Path, scene: confab.Scene) -> None:
     assert scene.picture(classes=True).size[0] > 100
     assert scene.picture(tmp_path / "card.png", behavior="B2_PICK").is_file()
 
 
-def test_what_is_no_number_is_refused_in_words(scene: confab.Scene, result: confab.Result) -> None:
+def test_an_argument_of_a_wrong_type_is_refused_in_one_sentence(scene: confab.Scene, result: confab.Result) -> None:
     with pytest.raises(confab.KnowledgeError, match=r"time_limit='5' is no number; wanted seconds as a number, e.g. 5"):
         scene.plan(time_limit="5")  # type: ignore[arg-type]
     with pytest.raises(confab.KnowledgeError, match="rollouts='3' is no number"):
@@ -142,7 +142,7 @@ def test_what_is_no_number_is_refused_in_words(scene: confab.Scene, result: conf
         scene.plan(7)  # type: ignore[arg-type]
 
 
-def test_a_plan_is_put_in_another_order_only_where_it_can_be_done(result: confab.Result) -> None:
+def test_a_plan_is_reordered_only_if_the_new_order_is_applicable(result: confab.Result) -> None:
     assert [step.id for step in result.in_order(22, 34, 28, 39).steps] == [22, 34, 28, 39]
     with pytest.raises(confab.KnowledgeError, match="wanted 22, 28, 34, 39 in another order; got 22"):
         result.in_order(22)
@@ -150,12 +150,12 @@ def test_a_plan_is_put_in_another_order_only_where_it_can_be_done(result: confab
         result.in_order(39, 34, 28, 22)
 
 
-def test_a_ready_query_is_asked_by_its_name(scene: confab.Scene) -> None:
+def test_a_shipped_query_is_run_by_its_name(scene: confab.Scene) -> None:
     assert ("cup1", "location2") in scene.query("where-is-everything")
     with pytest.raises(confab.KnowledgeError, match="did you mean 'where-is-everything'"):
         scene.query("where-is-everythin")
 
 
-def test_a_picture_of_classes_tells_what_follows() -> None:
+def test_a_picture_of_classes_marks_derived_situation_types() -> None:
     words = [text.get_text() for text in class_tree(confab.load("packing-small")).axes[0].texts]
     assert "Thing\nLIES_IN\nfollows: INSIDE, OUT_OF_REACH,\nSTORED_AWAY" in words

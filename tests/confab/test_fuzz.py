@@ -23,13 +23,13 @@ def given(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("door", sorted({door for door, *_ in fuzz.known()}))
-def test_the_cases_that_broke_once_hold(given: Path, door: str) -> None:
+def test_inputs_that_once_caused_faults_cause_none(given: Path, door: str) -> None:
     seeds = [seed for where, seed, _ in fuzz.known() if where == door]
     assert [str(failure) for failure in fuzz.run_batch(door, seeds, given)] == []
 
 
 @pytest.mark.parametrize("door", fuzz.DOORS)
-def test_a_share_of_new_cases_holds_at_each_door(given: Path, door: str) -> None:
+def test_a_sample_of_new_inputs_causes_no_fault_at_any_entry_point(given: Path, door: str) -> None:
     share = 1 if door in ("bodies", "urdf", "meshes") else 2
     assert [str(failure) for failure in fuzz.run_batch(door, range(1_000_000, 1_000_000 + share), given)] == []
 
@@ -47,7 +47,9 @@ def test_a_share_of_new_cases_holds_at_each_door(given: Path, door: str) -> None
         ("import sys; sys.exit(2)", "exit 2 with 0 lines"),
     ],
 )
-def test_each_way_to_break_is_seen(given: Path, monkeypatch: pytest.MonkeyPatch, replaced: str, what: str) -> None:
+def test_the_fuzzer_detects_each_kind_of_fault(
+    given: Path, monkeypatch: pytest.MonkeyPatch, replaced: str, what: str
+) -> None:
     monkeypatch.setattr("confab.commands.planning.load_scene", lambda *_: exec(replaced + "\nimport sys; sys.exit(0)"))
     monkeypatch.setattr(fuzz, "SECONDS", 1 if "while" in replaced else 30)
     monkeypatch.setattr(fuzz, "WAITING", 1 if "sleep" in replaced else 600)
@@ -57,7 +59,7 @@ def test_each_way_to_break_is_seen(given: Path, monkeypatch: pytest.MonkeyPatch,
     assert what in failure.what
 
 
-def test_a_plan_that_is_none_is_seen(given: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_fuzzer_detects_an_invalid_plan(given: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("confab.planner.validation.validate", lambda *_: ["seeded"])
     monkeypatch.setitem(fuzz.DOORS, "plan", (lambda _, folder: ["plan", str(folder / "scene.ttl"), "--json"], 1))
     failure = fuzz.run_case("plan", 0, given)
@@ -65,7 +67,7 @@ def test_a_plan_that_is_none_is_seen(given: Path, monkeypatch: pytest.MonkeyPatc
     assert "no plan of what was read: seeded" in failure.what
 
 
-def test_a_false_no_is_seen(given: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_fuzzer_detects_a_wrong_unsolvable(given: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def no(_: Request) -> Outcome:
         return Outcome(Status.UNSOLVABLE, reason=Reason("seeded"))
 
@@ -77,7 +79,7 @@ def test_a_false_no_is_seen(given: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     assert "unsolvable was said of what a search of all states solves" in failure.what
 
 
-def test_after_a_crash_the_cases_behind_it_are_run(given: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_fuzzer_runs_the_remaining_inputs_after_a_crash(given: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def crash(draw: random.Random, folder: Path) -> list[str]:
         if draw.random() < 0.5:
             os.kill(os.getpid(), signal.SIGKILL)

@@ -18,12 +18,12 @@ def test_a_kill_loses_no_acknowledged_episode(command: str) -> None:
     assert lost == 0
 
 
-def test_eight_at_a_time_by_whichever_path_lose_nothing_though_one_is_killed() -> None:
+def test_eight_concurrent_learners_lose_no_episode_if_one_is_killed() -> None:
     _, lost = kills.crowd(5)
     assert lost == 0
 
 
-def test_a_loss_would_be_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_benchmark_detects_a_lost_episode_after_a_kill(monkeypatch: pytest.MonkeyPatch) -> None:
     save = Memory.save
 
     def forgetful(memory: Memory, *target: object) -> object:
@@ -36,7 +36,7 @@ def test_a_loss_would_be_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     assert lost > 0
 
 
-def test_a_loss_among_eight_would_be_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_benchmark_detects_a_lost_episode_among_eight_learners(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kills, "alone", lambda _: nullcontext())  # no process waits for another
     _, lost = kills.crowd(3)
     assert lost > 0

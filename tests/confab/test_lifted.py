@@ -50,17 +50,17 @@ OF_LOCK = RelationCondition("gateOf", ("?other", "?lock"))
         (ValueCondition("GATE", ("?gate",), "open", negated=True), "gate isn't open"),
     ],
 )
-def test_conditions_are_said_of_nobody_and_everybody(condition: Condition, sentence: str) -> None:
+def test_conditions_with_quantifiers_are_written_as_sentences(condition: Condition, sentence: str) -> None:
     assert Sayings(LABELS).condition(condition) == sentence
 
 
-def test_of_a_property_that_names_its_values_only_the_one_there_is_is_said() -> None:
+def test_a_value_that_names_the_state_is_written_without_the_property() -> None:
     assert LABELS.fact(Fact(Symbol("GATE", ("g",)), "shut")) == "g is shut"
     assert LABELS.fact(Fact(Symbol("MOORING", ("b",)), "tied up")) == "b is tied up"
     assert LABELS.fact(Fact(Symbol("IN", ("b",)), "shut")) == "b is in shut"
 
 
-def test_the_opposite_is_said_by_the_verb() -> None:
+def test_a_negated_fact_is_written_with_a_negated_verb() -> None:
     assert denied("hand can reach location") == "hand can't reach location"
     assert denied("FERRY EMPTY") == "not FERRY EMPTY"
 

@@ -5,7 +5,7 @@ from statistics import median
 from benchmarks.load import measured
 
 
-def test_honest_requests_are_answered_beside_slow_abandoned_and_malformed_ones() -> None:
+def test_normal_requests_are_answered_together_with_slow_abandoned_and_malformed_ones() -> None:
     quiet, loaded, said = measured(1 / 60)
     assert loaded.answers["honest", "200"] == len(loaded.seconds) == len(quiet.seconds) == 16
     assert {kind for kind, _ in loaded.answers} == {"honest", "slow", "abandoned", "malformed"}

@@ -26,7 +26,7 @@ def scene() -> confab.Scene:
     return confab.load("beverage-serving")
 
 
-def test_trust_is_kept_in_the_file_and_not_passed_on(tmp_path: Path, scene: confab.Scene) -> None:
+def test_trust_is_kept_in_the_memory_file_and_not_passed_on_by_a_merge(tmp_path: Path, scene: confab.Scene) -> None:
     memory, other = confab.Memory.of(scene), Experience("other")
     other.learn(Lesson(counted=[(GoalKind("LOCATION", ("Cup",)), ITSELF, Tally(1))]))
     memory.experience.merge(other)
@@ -55,9 +55,7 @@ def test_a_memory_is_read_without_the_facts_of_its_scene(tmp_path: Path, scene: 
     assert fresh.reading.names.agree(fresh.names)
 
 
-def test_a_memory_that_is_looked_after_without_its_scene_still_speaks_of_its_terms(
-    tmp_path: Path, scene: confab.Scene
-) -> None:
+def test_a_memory_that_is_edited_without_its_scene_keeps_its_terms(tmp_path: Path, scene: confab.Scene) -> None:
     file, other = tmp_path / "memory.ttl", tmp_path / "other.ttl"
     memory = confab.Memory.of(scene)
     memory.teach(scene, scene.plan())
@@ -101,7 +99,9 @@ def test_teaching_gives_rules_and_methods_of_every_level(scene: confab.Scene) ->
         memory.teach(confab.load("moved-serving"), plan)
 
 
-def test_advice_reads_like_a_page_and_an_edited_rule_changes_the_plan(tmp_path: Path, scene: confab.Scene) -> None:
+def test_the_page_of_a_memory_is_readable_and_an_edited_rule_changes_the_plan(
+    tmp_path: Path, scene: confab.Scene
+) -> None:
     memory, path = confab.Memory.of(scene), tmp_path / "memory.ttl"
     memory.teach(scene, scene.plan().plan)
     memory.save(path)
@@ -155,7 +155,7 @@ def test_learners_at_the_same_file_lose_nothing(tmp_path: Path) -> None:
     assert sum(confab.Memory.load(tmp_path / "memory.ttl").experience.episodes.values()) == 3
 
 
-def test_what_failed_when_it_was_carried_out_is_counted_as_failed(scene: confab.Scene) -> None:
+def test_rules_of_a_step_that_failed_in_execution_are_counted_as_failed(scene: confab.Scene) -> None:
     memory = confab.Memory.of(scene)
     memory.teach(scene, scene.plan().plan)
     episode = scene.execute().episode

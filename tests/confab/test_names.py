@@ -80,7 +80,7 @@ def things(scene: confab.Scene, result: confab.Result) -> dict[str, object]:
     }
 
 
-def test_each_wrong_name_in_a_table_says_the_right_one(things: dict[str, object]) -> None:
+def test_the_error_on_each_listed_wrong_name_gives_the_right_name(things: dict[str, object]) -> None:
     for kind, there in things.items():
         for right, names in HINTS[kind].items():
             for name in names.split():
@@ -90,13 +90,13 @@ def test_each_wrong_name_in_a_table_says_the_right_one(things: dict[str, object]
                     assert str(told.value).endswith(f"use {right}"), name
 
 
-def test_no_table_says_two_things_of_one_name() -> None:
+def test_no_table_of_hints_has_a_wrong_name_twice() -> None:
     for kind, table in {**HINTS, "command": COMMANDS}.items():
         names = [name for words in table.values() for name in words.split()]
         assert sorted(set(names)) == sorted(names), kind
 
 
-def test_right_names_are_what_the_hints_say(things: dict[str, object]) -> None:
+def test_all_names_in_hints_exist(things: dict[str, object]) -> None:
     for kind, there in things.items():
         for right in HINTS[kind]:
             path = re.match(r"[\w.]*", right)
@@ -137,7 +137,7 @@ def test_steps_are_hashable_and_a_result_equals_its_copy(result: confab.Result) 
     assert pickle.loads(pickle.dumps(result)) == result
 
 
-def test_a_misspelt_name_says_the_most_similar_one(scene: confab.Scene) -> None:
+def test_the_error_on_a_misspelt_name_gives_the_most_similar_name(scene: confab.Scene) -> None:
     with pytest.raises(AttributeError, match=r"a scene has no 'qury'; did you mean 'query'\?"):
         getattr(scene, "qury")  # noqa: B009
     with pytest.raises(AttributeError, match=r"did you mean 'load'"):
@@ -163,14 +163,14 @@ GUESSED = {
 
 
 @pytest.mark.parametrize("kind", GUESSED)
-def test_a_name_is_understood_by_its_words(kind: str) -> None:
+def test_a_wrong_name_is_matched_by_its_words(kind: str) -> None:
     pairs = [pair.split(":") for pair in GUESSED[kind].split()]
     told = {name: guessed(kind, name) for name, _ in pairs}
     assert [(name, told[name]) for name, right in pairs if right not in told[name]] == []
     assert guessed(kind, "xyzzy") == ""
 
 
-def test_a_scene_made_of_a_name_says_what_loads_it() -> None:
+def test_the_error_on_a_scene_constructed_from_a_name_gives_the_call_of_load() -> None:
     with pytest.raises(TypeError, match=r"use confab\.load\('beverage-serving'\)"):
         confab.Scene("beverage-serving")  # type: ignore[arg-type]
 
@@ -186,7 +186,7 @@ def test_a_plan_is_a_sequence_of_the_steps_of_its_first_level(result: confab.Res
     assert len(Plan(())) == 0
 
 
-def test_a_step_is_asked_for_by_itself_its_name_its_path_and_its_words(result: confab.Result) -> None:
+def test_a_step_is_accepted_as_object_number_name_path_and_words(result: confab.Result) -> None:
     step = result.plan[0]
     told = [
         repr(result.why(asked))
@@ -199,7 +199,7 @@ def test_a_plan_is_copied_and_pickled(result: confab.Result) -> None:
     assert copy.deepcopy(result.plan) == pickle.loads(pickle.dumps(result.plan)) == result.plan
 
 
-def test_a_plan_of_a_scene_whose_goals_hold_says_that_nothing_is_to_be_done(scene: confab.Scene) -> None:
+def test_an_empty_plan_states_that_all_goals_hold(scene: confab.Scene) -> None:
     now = scene.problem.initial
     done = scene.plan([f"{Fact(symbol, now[symbol])}" for symbol in scene.problem.goal])
     assert done.solved
@@ -233,7 +233,7 @@ def test_a_wrong_argument_is_understood_by_its_words_also_among_further_options(
         result.verify(xyzzy=1)  # type: ignore[call-arg]
 
 
-def test_a_wrong_access_to_a_scene_or_its_objects_says_the_right_one(scene: confab.Scene) -> None:
+def test_the_error_on_a_wrong_access_to_a_scene_gives_the_right_access(scene: confab.Scene) -> None:
     with pytest.raises(TypeError, match="use objects"):
         scene["cup1"]
     with pytest.raises(AttributeError, match=r"use \['cup1'\]"):
@@ -266,7 +266,7 @@ def test_an_error_names_a_parameter_in_python_and_an_option_on_the_command_line(
     assert "leave out --optimal" in refused(["plan", "beverage-serving", "--engine", "fast-downward", "--optimal"])
 
 
-def test_three_words_of_a_goal_as_three_arguments_say_that_a_goal_is_one_text(scene: confab.Scene) -> None:
+def test_the_error_on_a_goal_in_three_arguments_says_that_a_goal_is_one_text(scene: confab.Scene) -> None:
     with pytest.raises(confab.KnowledgeError, match=r"the goal 'cup2' is no fact; wanted one text"):
         scene.plan("cup2", "LOCATION", "location8")  # type: ignore[arg-type]
 
@@ -285,7 +285,9 @@ def test_an_incomplete_fact_gets_an_example_of_its_own_scene(scene: confab.Scene
     assert str(told.value).rpartition("e.g. ")[2].strip("'") in scene.goals
 
 
-def test_a_step_is_explained_like_why_and_an_unknown_one_gets_the_steps(result: confab.Result) -> None:
+def test_explain_and_why_give_the_same_answer_and_the_error_on_an_unknown_step_lists_the_steps(
+    result: confab.Result,
+) -> None:
     step = result.plan[0]
     assert result.explain(step) == result.why(step)
     with pytest.raises(confab.KnowledgeError, match=re.escape(result.labels.step(step))):
@@ -380,7 +382,7 @@ def test_the_words_of_a_name_are_found_behind_capital_letters_and_beside_unknown
         (["plan", "two-cups", "--goal", "spoon LOCATION location1"], "LOCATION is of bottle1, cup1, cup2"),
     ],
 )
-def test_misuse_of_the_command_line_is_told_in_plain_words(refused: Refused, line: list[str], said: str) -> None:
+def test_misuse_of_the_command_line_is_reported_in_plain_words(refused: Refused, line: list[str], said: str) -> None:
     assert said in refused(line)
 
 

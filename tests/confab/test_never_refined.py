@@ -41,7 +41,9 @@ def scene(folder: Path, *texts: str) -> confab.Scene:
 
 
 @MODES
-def test_what_no_level_below_changes_so(tmp_path: Path, options: dict[str, object]) -> None:
+def test_a_behaviour_whose_effect_no_lower_level_achieves_is_an_error(
+    tmp_path: Path, options: dict[str, object]
+) -> None:
     with pytest.raises(
         KnowledgeError, match=r"DYE of level 1 can never be refined: it makes COLOR blue.*from level 2 on"
     ):
@@ -49,7 +51,9 @@ def test_what_no_level_below_changes_so(tmp_path: Path, options: dict[str, objec
 
 
 @MODES
-def test_a_rest_value_that_nothing_brings_back(tmp_path: Path, options: dict[str, object]) -> None:
+def test_a_behaviour_whose_rest_value_no_behaviour_restores_is_an_error(
+    tmp_path: Path, options: dict[str, object]
+) -> None:
     with pytest.raises(
         KnowledgeError, match=r"DIP of level 2 can be in no plan: it makes WET true.*level 2.*back to false"
     ):
@@ -57,14 +61,14 @@ def test_a_rest_value_that_nothing_brings_back(tmp_path: Path, options: dict[str
 
 
 @MODES
-def test_what_is_brought_back_is_planned(tmp_path: Path, options: dict[str, object]) -> None:
+def test_a_behaviour_whose_rest_value_is_restored_is_planned(tmp_path: Path, options: dict[str, object]) -> None:
     assert [step.behavior for step in scene(tmp_path, DYED, WETTED, DRIED).plan(**options).plan.primitives] == [  # type: ignore[arg-type]
         "DIP",
         "DRY",
     ]
 
 
-def test_a_goal_may_want_what_is_not_at_rest(tmp_path: Path) -> None:
+def test_a_goal_may_require_another_value_than_the_rest_value(tmp_path: Path) -> None:
     """Only planning can tell whether a goal that isn't at rest is reachable; a goal need not have its rest value."""
     assert scene(tmp_path, DYED, WETTED).plan(["x WET true"]).outcome.status is Status.SOLVED
 

@@ -20,14 +20,14 @@ def cells(path: Path, kind: str) -> list[dict[str, Any]]:
     return [cell for cell in json.loads(path.read_text(encoding="utf-8"))["cells"] if cell["cell_type"] == kind]
 
 
-def test_there_are_eight_and_each_leads_to_the_next() -> None:
+def test_there_are_eight_notebooks_and_each_links_to_the_next() -> None:
     assert [path.name[:3] for path in BOOK] == [f"0{number}-" for number in range(1, 9)]
     for path, following in pairwise(BOOK):
         assert f"]({following.name})" in "".join(cells(path, "markdown")[-1]["source"]), path.name
 
 
 @pytest.mark.parametrize("path", BOOK, ids=lambda path: path.stem)
-def test_a_notebook_is_executed_asserted_and_small_and_has_no_helpers(path: Path) -> None:
+def test_a_notebook_is_executed_and_small_has_assertions_and_no_helper_code(path: Path) -> None:
     code = cells(path, "code")
     assert [cell["execution_count"] for cell in code] == list(range(1, len(code) + 1))
     assert not [output for cell in code for output in cell["outputs"] if output["output_type"] == "error"]
@@ -38,7 +38,7 @@ def test_a_notebook_is_executed_asserted_and_small_and_has_no_helpers(path: Path
 
 
 @pytest.mark.parametrize("path", BOOK, ids=lambda path: path.stem)
-def test_what_a_notebook_points_to_exists(path: Path) -> None:
+def test_the_link_targets_of_a_notebook_exist(path: Path) -> None:
     text = "\n".join("".join(cell["source"]) for cell in cells(path, "markdown"))
     for target in re.findall(r"\]\(([^)#\s]+)", text):
         assert (path.parent / target).exists(), target

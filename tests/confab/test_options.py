@@ -26,7 +26,7 @@ def scene() -> confab.Scene:
     return confab.load("beverage-serving")
 
 
-def test_a_plan_can_start_from_what_was_seen(tmp_path: Path, scene: confab.Scene) -> None:
+def test_a_plan_can_start_from_observed_facts(tmp_path: Path, scene: confab.Scene) -> None:
     seen = {**scene.problem.initial, Symbol("LOCATION", ("cup1",)): "location7"}
     save_observed(tmp_path / "seen.ttl", seen, scene.names, scene.iri)
     steps = [str(step) for step in scene.plan(observed=tmp_path / "seen.ttl").plan.steps]
@@ -34,7 +34,7 @@ def test_a_plan_can_start_from_what_was_seen(tmp_path: Path, scene: confab.Scene
     assert not any("B1_MOVE cup1" in step for step in steps)
 
 
-def test_the_bound_is_no_more_than_the_plan_costs(scene: confab.Scene) -> None:
+def test_the_bound_does_not_exceed_the_cost_of_the_plan(scene: confab.Scene) -> None:
     result = scene.plan(optimal=True, time_limit=2.0)
     assert result.outcome.bound is not None
     assert 0 < result.outcome.bound <= len(result.plan.primitives) <= 32
@@ -77,7 +77,7 @@ def test_a_plan_that_the_checker_rejects_never_leaves_the_command_line(
     assert "returned steps that are no plan" in printed.err
 
 
-def test_every_mode_says_of_a_place_out_of_reach_that_it_is_out_of_reach(tmp_path: Path) -> None:
+def test_every_mode_reports_that_no_hand_reaches_the_goal_place(tmp_path: Path) -> None:
     write_scene(tmp_path / "table.ttl", "unsolvable")
     for mode in get_args(Mode):
         outcome = confab.load(tmp_path / "table.ttl").plan(mode=mode).outcome
@@ -86,7 +86,7 @@ def test_every_mode_says_of_a_place_out_of_reach_that_it_is_out_of_reach(tmp_pat
         assert "a Hand that canReach location7, and there is none" in outcome.reason.text
 
 
-def test_a_place_that_only_an_absence_speaks_of_is_recognised(tmp_path: Path) -> None:
+def test_a_place_that_only_an_absence_condition_names_is_in_the_slice(tmp_path: Path) -> None:
     # No fact connects the plate with the sink, except that a behaviour may bring the plate to any free place.
     new_domain("tearoom", tmp_path)
     tearoom = confab.load(tmp_path / "tearoom-scene.ttl")
@@ -94,7 +94,7 @@ def test_a_place_that_only_an_absence_speaks_of_is_recognised(tmp_path: Path) ->
     assert [step.behavior for step in tearoom.plan().plan.steps] == ["B1_CARRY", "B1_WASH", "B1_CARRY"]
 
 
-def test_a_no_is_given_only_after_a_look_at_the_whole_world(tmp_path: Path) -> None:
+def test_unsolvable_is_returned_only_for_the_whole_scene(tmp_path: Path) -> None:
     write_scene(tmp_path / "table.ttl", "unsolvable", objects=4, clutter=20)
     scene = confab.load(tmp_path / "table.ttl")
     result = scene.plan()

@@ -16,7 +16,7 @@ from confab.cli import main
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the kernel's part is Linux's")
 @pytest.mark.parametrize("sign", [signal.SIGKILL, signal.SIGSEGV, signal.SIGINT])
-def test_a_long_query_ends_with_the_command_that_asks_it(
+def test_a_long_query_ends_with_its_command(
     sign: signal.Signals, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     new_domain("tearoom", tmp_path)

@@ -22,7 +22,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("door", DOORS, ids=lambda door: door.name)
-def test_a_command_replaces_only_what_is_of_the_kind_that_it_writes(door: Door, whole: Path) -> None:
+def test_a_command_replaces_only_files_of_the_kind_that_it_writes(door: Door, whole: Path) -> None:
     there = (*FILES, *LINKS, "folder", "pipe", "read-only", "its own")
     for what, answer in answers(door, whole, there):
         replaced = (what == "its own" and not door.new) or KIND_OF.get(what) == door.kind
@@ -39,7 +39,7 @@ def outputs(name: str, command: Command) -> Iterator[set[str]]:
             yield {f"{name} {option}" if option.startswith("-") else name for option in parameter.opts}
 
 
-def test_every_output_of_every_command_is_tried() -> None:
+def test_every_output_option_of_every_command_is_tested() -> None:
     tried = {door.name.removesuffix(f" {Path(door.file).name}") for door in DOORS}
     commands = {
         name: getattr(import_module(f"confab.commands.{module}"), it) for name, (module, it) in COMMANDS.items()
@@ -49,7 +49,7 @@ def test_every_output_of_every_command_is_tried() -> None:
     assert [names for names in found if not names & tried] == []
 
 
-def test_the_message_says_what_is_there_what_was_to_be_written_and_what_to_do(
+def test_the_message_names_the_kinds_of_the_existing_and_the_new_file_and_the_remedy(
     whole: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     scene = (whole / "tearoom-scene.ttl").read_text()
@@ -61,7 +61,7 @@ def test_the_message_says_what_is_there_what_was_to_be_written_and_what_to_do(
 
 
 @pytest.mark.parametrize("words", ["plan a.ttl --report a.ttl", "plan a.ttl --report r.html -o ./r.html"])
-def test_one_file_never_stands_for_two_things_in_a_call(words: str, whole: Path, tmp_path: Path) -> None:
+def test_one_file_is_refused_as_two_inputs_or_outputs_of_a_call(words: str, whole: Path, tmp_path: Path) -> None:
     with inside(tmp_path):
         Path("a.ttl").write_text("" if "r.html" in words else (whole / "generated.ttl").read_text())
         before = Path("a.ttl").read_bytes()
@@ -77,7 +77,7 @@ def test_a_converted_file_isnt_converted_onto_itself_also_not_through_a_hard_lin
         assert call("convert twice.ttl --behaviors individuals -o thrice.ttl") == 2
 
 
-def test_what_people_edit_is_recognised_only_until_they_do(tmp_path: Path) -> None:
+def test_a_generated_file_is_not_replaced_after_it_was_edited(tmp_path: Path) -> None:
     file = tmp_path / "scene.ttl"
     write_whole(file, stamped(GENERATED, ["<urn:a> <urn:b> <urn:c> ."]))
     check_replaceable(file, GENERATED)
@@ -107,7 +107,7 @@ def test_what_people_edit_is_recognised_only_until_they_do(tmp_path: Path) -> No
         ("a.md", "notes", "a text"),
     ],
 )
-def test_foreign_files_are_called_what_they_are(tmp_path: Path, name: str, content: str | bytes, told: str) -> None:
+def test_foreign_files_are_named_by_their_kind(tmp_path: Path, name: str, content: str | bytes, told: str) -> None:
     file = tmp_path / name
     file.write_bytes(content if isinstance(content, bytes) else content.encode())
     found = kind_of(file)

@@ -13,7 +13,7 @@ from confab.reasoner.validation.validate import validate
 LABELS = "SELECT ?label WHERE { <https://example.org/tearoom-scene#plate3> rdfs:label ?label }"
 
 
-def test_what_owlready2_adds_is_seen_by_sparql_and_by_the_planner(tmp_path: Path) -> None:
+def test_facts_added_by_owlready2_affect_queries_and_plans(tmp_path: Path) -> None:
     new_domain("tearoom", tmp_path)
     scene = confab.load(tmp_path / "tearoom-scene.ttl")
     assert len(scene.query(LABELS)) == 0
@@ -29,7 +29,7 @@ def test_what_owlready2_adds_is_seen_by_sparql_and_by_the_planner(tmp_path: Path
     assert result.json()["steps"][0]["arguments"] == ["plate3"]
 
 
-def test_what_owlready2_removes_is_gone(tmp_path: Path) -> None:
+def test_facts_removed_by_owlready2_are_removed_from_the_graph(tmp_path: Path) -> None:
     new_domain("tearoom", tmp_path)
     scene = confab.load(tmp_path / "tearoom-scene.ttl")
     plate = scene.owl["https://example.org/tearoom-scene#plate1"]

@@ -94,14 +94,14 @@ def test_a_page_loads_nothing_and_its_text_is_data(pages: dict[str, PageData]) -
         assert json.loads(content) == json.loads(json.dumps(data)), name
 
 
-def test_steps_are_told_in_labels_with_their_reasons_and_names(pages: dict[str, PageData]) -> None:
+def test_the_page_shows_steps_in_labels_with_their_reasons_and_names(pages: dict[str, PageData]) -> None:
     first = pages["plan"]["steps"][0]
     assert (first["what"], first["number"], first["name"]) == ("move cup 1 to location 7", "L1#0", "B1_MOVE #22")
     assert first["needs"] == ["the goal requires that cup 1 is at location 7"]
     assert "left hand holds cup 1 (before: nothing)" in pages["plan"]["steps"][1]["gives"]
 
 
-def test_a_failed_run_says_what_failed_and_what_was_measured(pages: dict[str, PageData]) -> None:
+def test_the_page_of_a_failed_run_shows_the_failure_and_the_measurements(pages: dict[str, PageData]) -> None:
     data = pages["failed"]
     assert (data["good"], data["status"]) == (False, "failed in physics")
     assert data["alarm"]["measured"] == [("joint lag", "4.94°")]
@@ -134,7 +134,7 @@ def test_the_title_of_a_page_is_the_title_of_the_scene_s_ontology(
     assert confab.load(rdf).title == "Our kitchen"
 
 
-def test_a_colour_means_one_thing(serving_plan: confab.Result, pages: dict[str, PageData]) -> None:
+def test_each_colour_of_the_page_has_one_meaning(serving_plan: confab.Result, pages: dict[str, PageData]) -> None:
     problem, rows = serving_plan.problem, {row["label"]: row["bars"] for row in pages["plan"]["rows"]}
     assert [bar["tone"] for bar in rows["cup 1 is at"]] == ["start", "between", "wanted"]
     assert {bar["tone"] for bar in rows["left hand holds"]} == {"start", "between"}
@@ -196,7 +196,9 @@ def test_a_polygon_alone_is_a_place_too_and_other_shapes_are_left_out() -> None:
     assert [area.name for area in ground.areas] == ["den"]
 
 
-def test_time_is_told_once_and_whole(serving_plan: confab.Result, failed: confab.Report) -> None:
+def test_the_periods_of_a_timeline_cover_its_time_without_gaps(
+    serving_plan: confab.Result, failed: confab.Report
+) -> None:
     problem, plan = serving_plan.problem, serving_plan.plan
     for timeline in (of_plan(problem, plan), of_rollout(problem, plan, failed.rollouts[0])):
         for periods in timeline.phases.values():
@@ -220,13 +222,13 @@ def test_a_schedule_has_a_lane_for_each_actor_with_slack(name: str) -> None:
         assert all(one["end"] <= other["begin"] + 1e-3 for one, other in pairwise(row["bars"])), row["label"]
 
 
-def test_an_episode_is_told_as_it_was_seen(scene: confab.Scene) -> None:
+def test_the_timeline_of_an_episode_ends_with_the_observed_values(scene: confab.Scene) -> None:
     episode = scene.execute(interventions=FIGURE_8).episode
     timeline = of_episode(scene.problem, episode)
     assert all(periods[-1].value == episode.observed[symbol] for symbol, periods in timeline.phases.items())
 
 
-def test_nothing_to_do_makes_a_page(serving_plan: confab.Result) -> None:
+def test_an_empty_plan_has_a_page(serving_plan: confab.Result) -> None:
     nothing = replace(serving_plan, outcome=replace(serving_plan.outcome, plan=Plan(())))
     assert page_data(serving_plan.scene, nothing)["status"] == "nothing to do: all goals hold"
 
@@ -234,7 +236,7 @@ def test_nothing_to_do_makes_a_page(serving_plan: confab.Result) -> None:
 # ------------------------------------------------------------------------------------------------------ changed facts
 
 
-def test_a_fact_that_is_turned_changes_the_plan(scene: confab.Scene) -> None:
+def test_a_fact_changed_on_the_page_changes_the_plan(scene: confab.Scene) -> None:
     sheet = Sheet(scene)
     assert sheet.answer({})["headline"].startswith("solved: 4 / 10 / 32")
     answer = sheet.answer(FACTS)
@@ -244,7 +246,7 @@ def test_a_fact_that_is_turned_changes_the_plan(scene: confab.Scene) -> None:
     )
 
 
-def test_goals_are_turned_and_dropped_and_what_cannot_be_says_why(scene: confab.Scene) -> None:
+def test_goals_are_changed_and_dropped_on_the_page_and_impossible_changes_get_a_reason(scene: confab.Scene) -> None:
     sheet = Sheet(scene)
     dropped: Turned = {"goals": {key: None for key, symbol in sheet.symbols.items() if symbol in sheet.problem.goal}}
     assert sheet.plan(dropped).plan.steps == ()
@@ -253,13 +255,13 @@ def test_goals_are_turned_and_dropped_and_what_cannot_be_says_why(scene: confab.
     assert "there is no cup9" in sheet.answer({"facts": {"cup9 LOCATION": "location5"}})["problem"]
 
 
-def test_ready_questions_are_those_that_the_scene_has_words_for(scene: confab.Scene) -> None:
+def test_shipped_queries_are_those_whose_vocabulary_the_scene_imports(scene: confab.Scene) -> None:
     there, elsewhere = ({one["name"] for one in ready_queries(s.knowledge)} for s in (scene, shipped("towers-small")))
     assert there - elsewhere >= {"where-is-everything", "what-can-be-poured"}
     assert "what-is-wanted" in there & elsewhere
 
 
-def test_an_intervention_is_heeded_and_a_sentence_says_what_cannot_be_done(scene: confab.Scene) -> None:
+def test_an_intervention_on_the_page_is_executed_and_an_impossible_one_is_reported(scene: confab.Scene) -> None:
     turned: Turned = {"interventions": [{"after": "28", "key": "cup2 LOCATION", "value": "location8", "what": "world"}]}
     assert "1 intervention, 1 change of plan" in Sheet(scene).answer(turned)["headline"]
     turned["interventions"][0]["value"] = "no_place"
@@ -267,7 +269,7 @@ def test_an_intervention_is_heeded_and_a_sentence_says_what_cannot_be_done(scene
 
 
 @pytest.mark.parametrize("name", ["house-small", "canal-small"])
-def test_any_world_can_be_turned(name: str) -> None:
+def test_the_page_offers_changes_in_any_world(name: str) -> None:
     sheet = Sheet(shipped(name))
     turnable = sheet.turnable()
     for row in turnable["rows"]:
@@ -280,7 +282,7 @@ def test_any_world_can_be_turned(name: str) -> None:
 @pytest.mark.parametrize(
     "data", [[], "x", {"facts": []}, {"facts": {"a": 1}}, {"goals": {"a": 1}}, {"interventions": [{}]}]
 )
-def test_what_is_no_turning_is_refused_in_a_sentence(data: object) -> None:
+def test_invalid_changes_from_the_page_are_refused(data: object) -> None:
     with pytest.raises(confab.KnowledgeError):
         turned_from(data)
 
@@ -313,7 +315,7 @@ def test_without_anywidget_a_sentence_says_what_to_install(monkeypatch: pytest.M
 
 
 @pytest.mark.skipif(find_spec("anywidget") is None, reason="needs anywidget (the extra notebook)")
-def test_the_widget_answers_what_the_page_turns_and_asks(scene: confab.Scene) -> None:
+def test_the_widget_answers_changes_and_queries_of_the_page(scene: confab.Scene) -> None:
     board: Any = scene.board()
     board.turned = FACTS
     assert board.data["headline"].startswith("solved: 3 / 8 / 26")
@@ -346,7 +348,7 @@ WIDE = """[...document.querySelectorAll("body *")].filter((e) => !e.closest(".sc
 
 @needs_browser
 @pytest.mark.parametrize(("name", "width"), [("failed", 1280), ("failed", 420), ("house-small", 420), ("none", 420)])
-def test_a_frozen_page_shows_itself_without_fault_at_any_width(
+def test_a_saved_page_is_shown_without_errors_at_any_width(
     browser: Browser, pages: dict[str, PageData], name: str, width: int, tmp_path: Path
 ) -> None:
     browser.open(write_page(tmp_path / "page.html", pages[name]).as_uri(), width, dark=width == 420)
@@ -378,7 +380,9 @@ def test_a_click_on_a_lane_moves_the_clock_the_map_and_the_plan(
 
 
 @needs_browser
-def test_a_long_plan_is_folded_and_a_click_tells_what_a_narrow_bar_leaves_out(browser: Browser, tmp_path: Path) -> None:
+def test_a_long_plan_is_folded_and_a_click_on_a_narrow_bar_shows_its_full_text(
+    browser: Browser, tmp_path: Path
+) -> None:
     scene = confab.generate("served", tmp_path / "served.ttl", objects=20)
     browser.open(write_page(tmp_path / "page.html", page_data(scene, scene.plan())).as_uri(), 420)
     browser.wait("document.querySelector('.plan') !== null")
@@ -394,7 +398,7 @@ def test_a_long_plan_is_folded_and_a_click_tells_what_a_narrow_bar_leaves_out(br
 
 
 @needs_browser
-def test_a_fact_is_turned_and_a_query_asked_on_the_served_page(browser: Browser, served: Server) -> None:
+def test_facts_are_changed_and_queries_are_run_on_the_served_page(browser: Browser, served: Server) -> None:
     browser.open(served.url)
     lengths = "[...document.querySelectorAll('.tile')].map((e) => e.textContent).join(' ')"
     browser.wait(f"{lengths}.includes('4 / 10 / 32')")
@@ -444,7 +448,9 @@ window.leave = board.render({ model, el: document.getElementById("el") });
 
 
 @needs_browser
-def test_in_a_notebook_the_page_asks_the_kernel(browser: Browser, scene: confab.Scene, tmp_path: Path) -> None:
+def test_the_page_in_a_notebook_sends_queries_to_the_kernel(
+    browser: Browser, scene: confab.Scene, tmp_path: Path
+) -> None:
     sheet = Sheet(scene)
     data = json.dumps({**sheet.scene_data, **sheet.answer({})}).replace("<", "\\u003c")
     (tmp_path / "cell.html").write_text(NOTEBOOK % (script().replace("export default", "const board ="), data))
@@ -472,7 +478,7 @@ MEETING = """(() => { const words = [...document.querySelectorAll('.map text:not
 
 @needs_browser
 @pytest.mark.parametrize("name", ["beverage-serving", "cereal-serving", "kitchen-corner", "house-small", "two-tables"])
-def test_no_name_on_a_map_lies_on_another_and_none_is_lost(browser: Browser, name: str, tmp_path: Path) -> None:
+def test_labels_on_a_map_do_not_overlap_and_none_is_missing(browser: Browser, name: str, tmp_path: Path) -> None:
     data = page_data(shipped(name))
     address = write_page(tmp_path / "page.html", data).as_uri()
     for width in (1280, 420):

@@ -42,7 +42,7 @@ def test_the_plan_verifies_and_both_cups_hold_most_of_the_beverage(report: Repor
     assert min(rollout.poured) >= 0.8
 
 
-def test_what_was_seen_in_the_end_is_the_goal(scene: confab.Scene, report: Report) -> None:
+def test_the_final_perceived_state_fulfils_the_goal(scene: confab.Scene, report: Report) -> None:
     seen = report.rollouts[0].state
     assert {symbol: seen[symbol] for symbol in scene.problem.goal} == scene.problem.goal
 
@@ -64,7 +64,7 @@ def test_a_wall_before_a_bottle_fails_at_its_step_with_code_object_and_number(sc
     assert "hidden wall" in failed.notes()[failure.step.path]
 
 
-def test_a_failure_shows_what_was_expected_and_seen_or_what_the_code_does_not_say() -> None:
+def test_a_failure_shows_expected_and_perceived_values_or_objects_and_numbers() -> None:
     told = "HAND_TILT of left_hand: expected upright, seen tilted"
     assert str(Verdict(False, "unexpected", ("left_hand", "upright", "tilted"), message=told)) == f"unexpected: {told}"
     lost = SkillError("slip or drop", ("jar1",), "it isn't in the hand").verdict
@@ -74,7 +74,7 @@ def test_a_failure_shows_what_was_expected_and_seen_or_what_the_code_does_not_sa
     assert blocked.as_json()["message"] == "the hand or its load would touch something there"
 
 
-def test_what_nothing_perceives_is_counted_as_on_trust(scene: confab.Scene, report: Report) -> None:
+def test_effects_without_a_perceiver_are_counted_as_taken_on_trust(scene: confab.Scene, report: Report) -> None:
     assert report.trusted == {}
     symbol = Symbol("GREETED", ("cup1",))
     assert on_trust(scene, [{**scene.problem.initial, symbol: "warmly"}]) == {"GREETED": 1}
@@ -150,7 +150,7 @@ def _without_clock(rollout: Rollout) -> dict[str, object]:
 @pytest.mark.parametrize(
     ("display", "said"), [(None, "DISPLAY isn't set"), (":987", "':987' doesn't answer|libX11 is missing")]
 )
-def test_where_there_is_no_screen_a_window_is_refused_in_one_line(
+def test_a_window_without_a_screen_is_refused_in_one_line(
     display: str | None, said: str, scene: confab.Scene, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.delenv("DISPLAY", raising=False)
@@ -162,7 +162,7 @@ def test_where_there_is_no_screen_a_window_is_refused_in_one_line(
     assert not (tmp_path / "films").exists()
 
 
-def test_a_screen_shows_what_is_done_no_faster_than_the_simulated_time(
+def test_a_screen_shows_the_simulation_no_faster_than_simulated_time(
     scene: confab.Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Without a display, PyBullet's server refuses to draw; the requests to the server are recorded all the same."""

@@ -45,19 +45,19 @@ def test_stdin_is_read_once_and_pictures_do_not_go_to_stdout() -> None:
     assert "a picture can't be written to stdout" in said
 
 
-def test_what_is_no_scene_on_stdin_is_refused_in_a_line() -> None:
+def test_an_invalid_scene_on_stdin_is_refused_in_one_line() -> None:
     for given in (b"", b"\xff\xfe", b"{", b"<rdf:RDF", b"no turtle"):
         code, _, said = piped("plan", "-", given=given)
         assert (code, said.count("\n")) == (2, 1), said
         assert "/tmp" not in said
 
 
-def test_verbose_says_what_stages_take() -> None:
+def test_verbose_prints_the_times_of_stages() -> None:
     _, _, said = piped("plan", "towers-small", "-v")
     assert "planning took" in said
 
 
-def test_without_pybullet_run_says_first_what_is_missing_and_writes_the_rest(tmp_path: Path) -> None:
+def test_run_without_pybullet_names_the_missing_parts_first_and_writes_the_others(tmp_path: Path) -> None:
     code, out, said = piped("run", "two-cups", "-o", "out", line=WITHOUT, at=tmp_path)
     assert code == 2
     assert said.index("won't be verified, filmed or learned from") < said.index("planning")
@@ -87,7 +87,7 @@ def test_noise_reaches_physics(monkeypatch: pytest.MonkeyPatch) -> None:
     assert seen == [0.002]
 
 
-def test_noise_is_refused_where_nothing_is_measured() -> None:
+def test_noise_is_refused_in_a_world_without_measurements() -> None:
     with pytest.raises(confab.KnowledgeError, match="only in the world pybullet"):
         confab.load("towers-small").execute(noise=0.001)
 
@@ -117,27 +117,27 @@ def test_each_kept_run_has_a_folder_of_its_own(tmp_path: Path) -> None:
     assert [new_folder(tmp_path).name for _ in range(2)] == ["008", "009"]
 
 
-def test_no_package_is_named_after_a_typo() -> None:
+def test_the_message_on_a_misspelt_engine_names_no_package_with_the_typo() -> None:
     with pytest.raises(confab.KnowledgeError) as told:
         confab.load("towers-small").plan(engine="fast-downwrad")
     assert "up-fast-downwrad" not in str(told.value)
     assert "fast-downward" in str(told.value)
 
 
-def test_what_is_proved_of_a_length_is_said_in_plain_words() -> None:
+def test_the_proved_bound_of_a_plan_is_reported_in_plain_words() -> None:
     assert "proved shortest on the lowest level" in repr(confab.load("two-cups").plan(optimal=True))
     said = repr(confab.load("beverage-serving").plan(optimal=True, time_limit=1))
     assert "not proved shortest: any plan for these goals has at least" in said
 
 
-def test_a_plan_whose_steps_undo_each_other_says_so_and_how_to_ask_for_less() -> None:
+def test_a_plan_whose_steps_undo_each_other_is_reported_with_the_option_for_a_shorter_one() -> None:
     said = confab.load("three-cups").plan().dearer()
     assert said.startswith("12 of the 30 primitives only undo each other")
     assert "--optimal" in said
     assert confab.load("beverage-serving").plan().dearer() == ""
 
 
-def test_a_reader_that_ends_early_is_no_negative_answer() -> None:
+def test_a_closed_output_pipe_has_another_exit_code_than_a_negative_answer() -> None:
     """The exit code is 141, like that of a process whose output pipe was closed."""
     done = subprocess.Popen(
         [sys.executable, "-m", "confab", "query", "drums-large", "--affords", "all"], stdout=subprocess.PIPE

@@ -49,7 +49,7 @@ def refused(act: Callable[[], object]) -> str:
 
 
 @pytest.mark.parametrize(("fact", "message"), WRONG)
-def test_what_can_t_be_is_refused_at_every_door_in_the_same_words(
+def test_an_impossible_fact_is_refused_at_every_entry_point_in_the_same_words(
     fact: str, message: str, scene: confab.Scene, tmp_path: Path
 ) -> None:
     about, situation, value = fact.split()
@@ -63,7 +63,7 @@ def test_what_can_t_be_is_refused_at_every_door_in_the_same_words(
     assert message in refused(lambda: load_observed(tmp_path / "seen.ttl", scene.reading))
 
 
-def test_a_file_is_told_the_same(tmp_path: Path) -> None:
+def test_validation_of_a_file_reports_an_impossible_fact_in_the_same_words(tmp_path: Path) -> None:
     for name, place, more, message in (
         ("twice", "location1", "", TWICE),
         ("held", "location2", "r:left_hand k:holds :cup1 .", HELD),
@@ -78,7 +78,7 @@ def test_a_file_is_told_the_same(tmp_path: Path) -> None:
         assert finding.line
 
 
-def test_an_intervention_that_can_t_happen_later_is_refused_when_it_would(scene: confab.Scene) -> None:
+def test_an_intervention_that_is_impossible_at_its_step_is_refused_there(scene: confab.Scene) -> None:
     said = refused(lambda: scene.execute(interventions="after=28 cup2 LOCATION location7"))
     assert said.startswith("'after=28 cup2 LOCATION location7' can't happen: cup1 and cup2 have the same LOCATION")
     said = refused(lambda: scene.execute(interventions="after=28 add Cup cup9 LOCATION location5"))
@@ -95,20 +95,20 @@ def test_an_amount_out_of_its_bounds_is_refused() -> None:
         assert message in refused(lambda fact=fact: scene.execute(interventions=f"at=1 {fact}"))  # type: ignore[misc]
 
 
-def test_cups_that_change_places_and_a_cup_that_a_hand_lifted_or_grasped_can_be(scene: confab.Scene) -> None:
+def test_swapped_places_of_cups_and_a_lifted_or_grasped_cup_are_possible_facts(scene: confab.Scene) -> None:
     assert scene.with_fact("cup1 LOCATION location1", "cup2 LOCATION location2").plan().solved
     assert "left_hand HOLDS cup1" in scene.with_fact("left_hand HOLDS cup1", "cup1 LOCATION in_hand").facts
     assert scene.with_fact("left_hand HOLDS cup1", "left_hand HAND_POSITION cup1").facts
 
 
-def test_what_is_not_known_is_no_fault(scene: confab.Scene) -> None:
+def test_an_unknown_fact_is_no_fault(scene: confab.Scene) -> None:
     problem = scene.problem
     assert not [*impossible(problem, {})]
     assert not [*impossible(problem, {Symbol("LOCATION", ("cup1",)): "in_hand"})]
     assert not [*impossible(problem, {Symbol("HOLDS", ("left_hand",)): "cup1"})]
 
 
-def test_what_a_scene_has_wrong_already_does_not_refuse_other_facts(tmp_path: Path) -> None:
+def test_an_existing_fault_of_a_scene_does_not_prevent_other_facts(tmp_path: Path) -> None:
     (tmp_path / "twice.ttl").write_text(SCENE.format(name="twice", place="location1"), encoding="utf-8")
     scene = confab.load(tmp_path / "twice.ttl")
     assert scene.with_fact("right_hand HAND_TILT tilted").facts

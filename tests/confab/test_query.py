@@ -34,7 +34,7 @@ def run() -> CliRunner:
     return CliRunner()
 
 
-def test_every_prefix_means_what_the_scenes_file_says(scene: confab.Scene) -> None:
+def test_every_prefix_of_the_file_of_a_scene_is_known_in_queries(scene: confab.Scene) -> None:
     assert scene.query(OF_CUP1)[0] == ("location2",)
     for name in ontology.scenes():
         other = confab.load(name)
@@ -73,7 +73,7 @@ def test_a_data_frame_has_types(scene: confab.Scene) -> None:
     assert frame.below.sum() > 5
 
 
-def test_answers_have_iris_where_they_are_asked_for(scene: confab.Scene, run: CliRunner, tmp_path: Path) -> None:
+def test_answers_have_iris_on_request(scene: confab.Scene, run: CliRunner, tmp_path: Path) -> None:
     table = scene.query("SELECT ?o ?n WHERE { ?o a k:Cup ; :index ?n } ORDER BY ?o")
     assert table.iris()[0] == (CUP1, "3")
     standard = json.loads(table.standard("sparql-json"))["results"]["bindings"]
@@ -92,7 +92,7 @@ def test_answers_have_iris_where_they_are_asked_for(scene: confab.Scene, run: Cl
     assert (told.exit_code, told.stdout) == (1, "false\n")
 
 
-def test_texts_of_any_signs_are_answered_as_they_are(scene: confab.Scene) -> None:
+def test_texts_with_any_characters_are_returned_unchanged(scene: confab.Scene) -> None:
     said = "tab\tline\nquote\" back\\slash 'é€' | <&>"
     table = scene.query(f"SELECT ({rdflib.Literal(said).n3()} AS ?text) ?nothing WHERE {{}}")
     assert table[0] == (said, None)
@@ -102,7 +102,7 @@ def test_texts_of_any_signs_are_answered_as_they_are(scene: confab.Scene) -> Non
 
 
 @pytest.mark.parametrize("behavior", ["B1_POUR", "B2_PICK", "B3_LIFT"])
-def test_a_shown_query_needs_nothing_of_ours(scene: confab.Scene, behavior: str) -> None:
+def test_a_displayed_query_runs_in_rdflib_without_additional_prefixes(scene: confab.Scene, behavior: str) -> None:
     shown = scene.quantifying_query(behavior)
     theirs = scene.graph.query(shown, initNs={})
     ours = scene.query(shown)
@@ -127,7 +127,7 @@ def test_a_faulty_query_is_answered_in_one_line_with_the_place(scene: confab.Sce
     assert len(str(caught.value)) < 300
 
 
-def test_any_file_of_rdf_can_be_asked_and_says_what_is_missing(
+def test_any_rdf_file_can_be_queried_and_planning_names_the_missing_import(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     (tmp_path / "any.ttl").write_text("@prefix : <http://e.org/a#> .\n:x :y :z .\n")
@@ -148,7 +148,7 @@ def test_any_file_of_rdf_can_be_asked_and_says_what_is_missing(
     assert confab.load(tmp_path / "any.ttl").query("SELECT ?o WHERE { :x :y ?o }")[0] == ("z",)
 
 
-def test_an_empty_answer_false_or_0_says_which_names_mean_nothing_here(
+def test_an_empty_answer_false_or_0_is_logged_with_the_unknown_terms_of_the_query(
     scene: confab.Scene, caplog: pytest.LogCaptureFixture
 ) -> None:
     with caplog.at_level(logging.WARNING):
@@ -180,7 +180,7 @@ def test_one_missing_value_blocks_no_query(tmp_path: Path) -> None:
 INSIDE = "SELECT ?what ?where WHERE { ?what d:isInside ?where } ORDER BY ?what ?where"
 
 
-def test_what_follows_at_first_is_asked_for_like_what_is_stated() -> None:
+def test_initial_derived_facts_are_queried_like_stated_facts() -> None:
     packing = confab.load("packing-small")
     rows = [("casket", "chest"), ("casket", "hall"), ("chest", "hall"), ("ring", "hall")]
     assert list(packing.query(INSIDE)) == rows
@@ -197,7 +197,7 @@ def test_what_follows_at_first_is_asked_for_like_what_is_stated() -> None:
     ]  # inside a box and inside a vault
 
 
-def test_what_follows_is_no_fact_of_the_scene() -> None:
+def test_a_query_about_derived_facts_does_not_change_the_scene() -> None:
     """Derived facts are computed in each state of a plan.
 
     The result of a query about the initial state doesn't affect planning.
@@ -209,7 +209,7 @@ def test_what_follows_is_no_fact_of_the_scene() -> None:
     assert packing.plan().plan.steps == before.plan.steps
 
 
-def test_working_out_what_follows_keeps_to_the_time_of_the_query() -> None:
+def test_the_derivation_of_facts_for_a_query_keeps_the_time_limit_of_the_query() -> None:
     problem = confab.load("packing-small").problem
     with within(0.0), pytest.raises(LimitError, match="gave up after 0 s while"):
         list(_following(problem, ["INSIDE"]))

@@ -41,7 +41,7 @@ def done(scene: Scene, mode: Mode = "guarded") -> list[tuple[str, ...]]:
     return [(step.behavior, *step.arguments) for step in scene.plan(mode=mode).plan.primitives]
 
 
-def test_a_swing_that_is_blocked_refutes_it_for_every_hand_and_both_ways_wherever_it_would_be_blocked() -> None:
+def test_a_blocked_swing_is_refuted_for_every_hand_both_directions_and_all_obstacles() -> None:
     scene, report = first()
     assert report.shown.failure is not None
     verdict = report.shown.failure.verdict
@@ -59,7 +59,7 @@ def test_a_swing_that_is_blocked_refutes_it_for_every_hand_and_both_ways_whereve
     assert str(refuted[-1]) == "not F3_OPEN any door while bottle LOCATION before_door: no path: door, bottle"
 
 
-def test_one_refutation_is_enough() -> None:
+def test_the_next_plan_after_one_refutation_avoids_the_obstacle() -> None:
     scene, report = first()
     known = knowing(scene, refuted_in(scene, report))
     steps = known.plan().plan.primitives
@@ -69,7 +69,7 @@ def test_one_refutation_is_enough() -> None:
     assert {state[IN_THE_WAY.symbol] for state in swings}.isdisjoint({"before_door", "in_hand"})
 
 
-def test_what_stands_elsewhere_is_not_in_the_way_of_a_swing() -> None:
+def test_an_object_at_another_place_does_not_block_a_swing() -> None:
     scene, _ = first()
     with PhysicsWorld(scene.embodiment, dict(scene.problem.initial) | {IN_THE_WAY.symbol: "left_spot"}) as world:
         check_swing(world, "door", [0.0, 0.5, 1.0, 1.5])
@@ -81,7 +81,7 @@ def test_what_stands_elsewhere_is_not_in_the_way_of_a_swing() -> None:
 
 
 @pytest.mark.parametrize("mode", ["guarded", "paper"])
-def test_the_next_plan_takes_what_is_in_the_way_away_first(mode: Mode) -> None:
+def test_the_next_plan_moves_the_obstacle_away_first(mode: Mode) -> None:
     scene, report = first()
     steps = done(knowing(scene, refuted_in(scene, report)), mode)
     before = steps[: steps.index(("F3_OPEN", "left_hand", "door"))]
@@ -89,7 +89,7 @@ def test_the_next_plan_takes_what_is_in_the_way_away_first(mode: Mode) -> None:
     assert done(scene)[0] == ("F3_OPEN", "left_hand", "door")  # the scene itself stays unchanged
 
 
-def test_what_was_refuted_is_kept_beside_the_scene_for_the_next_call(tmp_path: Path) -> None:
+def test_refutations_are_stored_in_a_file_beside_the_scene_for_the_next_call(tmp_path: Path) -> None:
     _, report = first()
     scene = confab.load(own(tmp_path))
     keep(scene, refuted_in(scene, report))
@@ -101,7 +101,7 @@ def test_what_was_refuted_is_kept_beside_the_scene_for_the_next_call(tmp_path: P
     assert "canReach" in text
 
 
-def test_what_was_refuted_about_something_that_is_gone_is_forgotten(tmp_path: Path) -> None:
+def test_refutations_about_a_removed_object_are_ignored(tmp_path: Path) -> None:
     _, report = first()
     path = own(tmp_path)
     scene = confab.load(path)
@@ -111,7 +111,7 @@ def test_what_was_refuted_about_something_that_is_gone_is_forgotten(tmp_path: Pa
     assert done(confab.load(path))[0] == ("F3_OPEN", "left_hand", "door")
 
 
-def test_what_is_false_can_be_what_a_refutation_holds_by() -> None:
+def test_a_refutation_can_depend_on_a_false_fact() -> None:
     scene = confab.load(BLOCKED)
     while_shut = (Fact(Symbol("OPENED", ("drawer",)), "false"),)
     refuted = [Refutation("B2_PICK", (hand, "lid"), while_shut) for hand in ("left_hand", "right_hand")]
@@ -119,7 +119,7 @@ def test_what_is_false_can_be_what_a_refutation_holds_by() -> None:
     assert ("F3_OPEN", "right_hand", "drawer") in done(knowing(scene, refuted))
 
 
-def test_nothing_is_written_into_what_is_shipped() -> None:
+def test_refutations_are_not_written_into_shipped_files() -> None:
     scene, report = first()
     file = ontology.ROOT / "scenes" / f"{BLOCKED}.reach.ttl"
     before = file.read_text(encoding="utf-8")

@@ -59,7 +59,9 @@ def test_verdicts_come_back_as_they_were_saved(scene: confab.Scene, tmp_path: Pa
 @pytest.mark.parametrize(
     "text", ["", "[]", "{}", "3", '{"scene": 1}', '{"rollouts": [3]}', '{"rollouts": [], "trusted": {}}']
 )
-def test_what_is_neither_is_refused_in_a_sentence(scene: confab.Scene, text: str, tmp_path: Path) -> None:
+def test_a_file_that_is_neither_an_episode_nor_a_verdict_is_refused(
+    scene: confab.Scene, text: str, tmp_path: Path
+) -> None:
     file = tmp_path / "wrong.json"
     file.write_text(text)
     for read in (lambda: scene.read_episode(file), lambda: scene.read_report(file, scene.plan())):
@@ -75,7 +77,7 @@ def test_an_episode_of_another_scene_or_in_turtle_is_refused(scene: confab.Scene
         scene.read_episode(done.save(tmp_path / "towers.ttl"))
 
 
-def test_the_page_of_what_was_saved_is_written_by_a_command(tmp_path: Path) -> None:
+def test_a_command_writes_the_page_of_a_saved_episode(tmp_path: Path) -> None:
     page, visit = tmp_path / "page.html", tmp_path / "visit.json"
     invoke = CliRunner().invoke
     assert invoke(app, ["execute", "towers-small", "-o", str(visit)]).exit_code == 0

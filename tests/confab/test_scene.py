@@ -67,7 +67,7 @@ def test_a_saved_plan_is_read_back_as_it_was(tmp_path: Path, scene: confab.Scene
         ([], "holds no plan"),
     ],
 )
-def test_a_plan_that_cannot_be_one_is_named_with_its_fault(
+def test_an_invalid_plan_file_is_refused_with_its_fault(
     tmp_path: Path, scene: confab.Scene, data: object, message: str
 ) -> None:
     path = tmp_path / "plan.json"

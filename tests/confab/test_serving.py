@@ -43,7 +43,9 @@ def pool() -> Iterator[urllib3.PoolManager]:
         yield manager
 
 
-def test_the_three_ways_of_the_protocol_have_the_same_answer(server: Server, pool: urllib3.PoolManager) -> None:
+def test_the_three_kinds_of_request_of_the_protocol_have_the_same_answer(
+    server: Server, pool: urllib3.PoolManager
+) -> None:
     url = server.url + "sparql"
     answers = [
         pool.request("GET", f"{url}?{urlencode({'query': CUPS})}"),
@@ -67,7 +69,7 @@ def test_the_three_ways_of_the_protocol_have_the_same_answer(server: Server, poo
         ("text/html, */*;q=0.1", "application/sparql-results+json", b'"bindings"'),
     ],
 )
-def test_rows_come_in_the_form_that_the_client_likes_best(
+def test_rows_have_the_format_that_the_client_prefers(
     server: Server, pool: urllib3.PoolManager, accept: str, kind: str, holds: bytes
 ) -> None:
     answer = pool.request("GET", f"{server.url}sparql?{urlencode({'query': CUPS})}", headers={"Accept": accept})
@@ -75,7 +77,7 @@ def test_rows_come_in_the_form_that_the_client_likes_best(
     assert holds in answer.data
 
 
-def test_truth_and_triples_are_answered(server: Server, pool: urllib3.PoolManager) -> None:
+def test_ask_and_construct_queries_are_answered(server: Server, pool: urllib3.PoolManager) -> None:
     asked = pool.request("GET", f"{server.url}sparql?{urlencode({'query': 'ASK { :cup1 a k:Cup }'})}")
     assert asked.json()["boolean"] is True
     built = f"{server.url}sparql?{urlencode({'query': 'CONSTRUCT WHERE { :cup1 ?p ?o }'})}"
@@ -85,7 +87,7 @@ def test_truth_and_triples_are_answered(server: Server, pool: urllib3.PoolManage
     assert pool.request("GET", built, headers={"Accept": "text/csv"}).status == 406
 
 
-def test_without_a_query_it_describes_itself(server: Server, pool: urllib3.PoolManager) -> None:
+def test_the_server_describes_itself_if_a_request_has_no_query(server: Server, pool: urllib3.PoolManager) -> None:
     answer = pool.request("GET", server.url + "sparql", headers={"Accept": "text/turtle"})
     said = rdflib.Graph().parse(data=answer.data, format="turtle")
     service = rdflib.Namespace("http://www.w3.org/ns/sparql-service-description#")
@@ -101,7 +103,7 @@ def test_rdflibs_own_client_is_answered(server: Server) -> None:
     assert len(remote) > 500
 
 
-def test_what_protege_asks_first_is_answered(server: Server, pool: urllib3.PoolManager) -> None:
+def test_the_first_query_of_protege_is_answered(server: Server, pool: urllib3.PoolManager) -> None:
     asked = """PREFIX rdf: <http://www.w3.org/1999/02/22-rdf-syntax-ns#>
 PREFIX owl: <http://www.w3.org/2002/07/owl#>
 PREFIX rdfs: <http://www.w3.org/2000/01/rdf-schema#>
@@ -118,7 +120,7 @@ SELECT ?subject ?object
         assert answer.data.count(b"https://w3id.org/confab/tabletop#Bottle") >= 1
 
 
-def test_our_own_client_plans_at_it(server: Server) -> None:
+def test_a_scene_behind_the_server_can_be_loaded_and_planned(server: Server) -> None:
     there = confab.load(server.url + "sparql", scene="https://w3id.org/confab/beverage-serving")
     assert there.plan().plan.length == {1: 4, 2: 10, 3: 32}
 
@@ -142,7 +144,7 @@ def test_our_own_client_plans_at_it(server: Server) -> None:
         ("GET", "sparql?query=SELECT+*+" + "{" * 3000 + "}" * 3000, None, None, 400),
     ],
 )
-def test_what_it_does_not_answer_has_a_status_and_a_line(
+def test_a_refused_request_has_a_status_and_one_line(
     server: Server, pool: urllib3.PoolManager, method: str, path: str, body: str | None, kind: str | None, status: int
 ) -> None:
     headers = {"Content-Type": kind} if kind else {}
@@ -152,7 +154,7 @@ def test_what_it_does_not_answer_has_a_status_and_a_line(
     assert b"Traceback" not in answer.data
 
 
-def test_only_this_machine_is_answered(server: Server, pool: urllib3.PoolManager) -> None:
+def test_only_requests_of_this_machine_are_answered(server: Server, pool: urllib3.PoolManager) -> None:
     url = f"{server.url}sparql?{urlencode({'query': CUPS})}"
     assert pool.request("GET", url, headers={"Host": "evil.example"}).status == 421
     asked = {"Origin": "http://localhost:8080", "Access-Control-Request-Method": "POST"}
@@ -231,9 +233,7 @@ def test_a_client_that_leaves_ends_its_query(server: Server) -> None:
     until(lambda: running(server) == 0)
 
 
-def test_a_process_is_free_for_another_query_only_when_its_own_has_ended_though_its_client_left_at_a_time_limit() -> (
-    None
-):
+def test_a_worker_is_free_only_after_its_query_has_ended_even_if_the_client_left() -> None:
     begun, ended = threading.Event(), threading.Event()
 
     def slow(_: object) -> None:
@@ -293,7 +293,7 @@ def test_short_queries_do_not_wait_for_long_ones_whose_clients_stay(
         ({"query": "ASK {}", "default-graph-uri": "https://example.org/"}, 400),
     ],
 )
-def test_the_dataset_that_is_named_is_asked_or_refused(
+def test_a_named_dataset_is_queried_or_refused(
     server: Server, pool: urllib3.PoolManager, fields: dict[str, str], answer: bool | int
 ) -> None:
     got = pool.request("GET", f"{server.url}sparql?{urlencode(fields)}")
@@ -303,7 +303,9 @@ def test_the_dataset_that_is_named_is_asked_or_refused(
         assert (got.status, b"no graph is named" in got.data) == (answer, True)
 
 
-def test_a_thousand_broken_and_crowding_requests_leave_it_alive(server: Server, pool: urllib3.PoolManager) -> None:
+def test_the_server_survives_a_thousand_broken_and_concurrent_requests(
+    server: Server, pool: urllib3.PoolManager
+) -> None:
     chance, path = random.Random(7), f"/sparql?{urlencode({'query': CUPS})}"
     good = f"GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode()
     long = b"POST /sparql HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/sparql-query\r\nContent-Length: "
@@ -346,7 +348,7 @@ def test_a_thousand_broken_and_crowding_requests_leave_it_alive(server: Server, 
     assert threading.active_count() < 120
 
 
-def test_the_connection_that_has_been_waited_for_longest_gives_place(
+def test_the_longest_idle_connection_is_closed_if_there_are_too_many(
     monkeypatch: pytest.MonkeyPatch, pool: urllib3.PoolManager
 ) -> None:
     monkeypatch.setattr("confab.serving.MOST", 3)
@@ -365,7 +367,7 @@ def test_the_connection_that_has_been_waited_for_longest_gives_place(
 @pytest.mark.parametrize(
     "begun", [b"GET / HT", b"POST /sparql HTTP/1.1\r\nHost: localhost\r\nContent-Length: 99\r\n\r\n"]
 )
-def test_a_request_has_one_time_to_come_in_however_it_trickles(monkeypatch: pytest.MonkeyPatch, begun: bytes) -> None:
+def test_a_slow_request_has_one_time_limit_for_all_its_parts(monkeypatch: pytest.MonkeyPatch, begun: bytes) -> None:
     monkeypatch.setattr("confab.serving.SLOWEST", 0.5)
     with (
         serving(confab.load("living-room"), 0) as server,
@@ -385,7 +387,7 @@ def test_a_request_has_one_time_to_come_in_however_it_trickles(monkeypatch: pyte
         assert answer == b"" or b" 408 " in answer
 
 
-def test_it_ends_though_connections_are_open_and_queries_run() -> None:
+def test_the_server_ends_even_if_connections_are_open_and_queries_run() -> None:
     with serving(confab.load("living-room"), 0) as server:
         waiting = [socket.create_connection(("127.0.0.1", server.port)) for _ in range(4)]
         asking = [sent(server, HEAVY) for _ in range(4)]
@@ -421,7 +423,7 @@ def test_a_client_follows_a_robot_that_acts(pool: urllib3.PoolManager) -> None:
     assert seen[-1] == "location7"
 
 
-def test_a_query_ends_with_the_process_that_asked_it(tmp_path: Path) -> None:
+def test_a_query_ends_with_the_process_that_sent_it(tmp_path: Path) -> None:
     code = "import sys, confab; print(flush=True); confab.load('living-room').query(sys.argv[1])"
     with subprocess.Popen([sys.executable, "-c", code, HEAVY], stdout=subprocess.PIPE) as asking:
         assert asking.stdout is not None and asking.stdout.readline()

@@ -104,7 +104,7 @@ def test_a_call_ends_by_the_limit_of_the_block_around_it(
         assert found.episode.status.value == "gave-up"
 
 
-def test_a_lesson_that_takes_too_long_teaches_nothing(solved: Result) -> None:
+def test_a_lesson_beyond_its_time_limit_adds_nothing_to_the_memory(solved: Result) -> None:
     memory = confab.Memory.of(solved.scene)
     with confab.within(SOON), pytest.raises(OutOfTimeError):
         memory.teach(solved.scene, solved)

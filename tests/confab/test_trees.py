@@ -82,7 +82,7 @@ def planned(name: str) -> tuple[Problem, Plan]:
 
 
 @pytest.mark.parametrize("name", ["rooms-waste", "two-cups", "drawers-small", "packing-small", "gallery-small"])
-def test_a_tree_carries_its_plan_out_in_the_order_of_the_plan(name: str) -> None:
+def test_a_behaviour_tree_executes_its_plan_in_the_order_of_the_plan(name: str) -> None:
     problem, plan = planned(name)
     world = SymbolicWorld(problem)
     reached, ticking = run(problem, plan, world)
@@ -116,7 +116,7 @@ class Undone(SymbolicWorld):
 
 
 @pytest.mark.parametrize("name", ["rooms-waste", "rooms-breakfast"])
-def test_a_tree_goes_on_by_itself_after_a_disturbance_that_undoes_a_step(name: str) -> None:
+def test_a_behaviour_tree_continues_after_a_disturbance_that_undoes_a_step(name: str) -> None:
     problem, plan = planned(name)
     for after in range(1, len(plan.primitives), 4):
         world = Undone(problem, after, random.Random(after))
@@ -135,7 +135,7 @@ def kinds(element: Element) -> list[str]:
     return [element.kind, *(kind for child in element.children for kind in kinds(child))]
 
 
-def test_the_files_are_whole_and_say_what_their_leaves_are(tmp_path: Path) -> None:
+def test_the_files_of_a_behaviour_tree_are_complete_and_define_their_leaves(tmp_path: Path) -> None:
     problem, plan = planned("rooms-waste")
     xml, python = export_trees(problem, plan, tmp_path)
     root = ElementTree.parse(xml).getroot()

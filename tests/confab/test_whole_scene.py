@@ -27,19 +27,19 @@ MODES = ("guarded", "strict", "optimal", "paper")
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_an_effect_on_a_class_asks_the_bounds_of_each_of_its_amounts(mode: Mode) -> None:
+def test_an_effect_on_a_class_requires_the_bounds_of_each_of_its_amounts(mode: Mode) -> None:
     result = confab.load(CASES / "lamps.ttl").plan(mode=mode)
     assert [step.behavior for step in result.plan.steps] == ["FILL", "BURN"]
     assert result.outcome.bound in (None, 2)
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_a_bound_that_nothing_can_keep_makes_the_task_unsolvable(mode: Mode) -> None:
+def test_a_bound_that_no_plan_keeps_makes_the_task_unsolvable(mode: Mode) -> None:
     assert confab.load(CASES / "lamps-without-oil.ttl").plan(mode=mode).outcome.status is Status.UNSOLVABLE
 
 
 @pytest.mark.parametrize("mode", ["guarded", "optimal", "paper"])
-def test_what_an_effect_on_a_class_touches_comes_to_rest_in_stretches_too(mode: Mode) -> None:
+def test_members_of_a_class_that_an_effect_changes_must_come_to_rest_in_stretches_too(mode: Mode) -> None:
     """The goal requires that one member of the class isn't at rest.
 
     The effect changes the other members, too, and no behaviour restores them.
@@ -97,7 +97,9 @@ def walk(problem: Problem, chance: Random) -> Plan:
 
 @settings(max_examples=30)
 @given(text=worlds(), seed=st.integers(0, 1000))
-def test_what_the_scene_refuses_is_what_is_wrong_in_the_whole_scene(forgetful: Forgetful, text: str, seed: int) -> None:
+def test_a_plan_is_refused_exactly_if_it_is_invalid_in_the_whole_scene(
+    forgetful: Forgetful, text: str, seed: int
+) -> None:
     """If recognition loses an individual, the scene refuses a plan exactly if the plan is invalid in the whole scene."""
     with TemporaryDirectory() as folder:
         graph = graph_of(text, Path(folder))
@@ -117,7 +119,7 @@ def test_what_the_scene_refuses_is_what_is_wrong_in_the_whole_scene(forgetful: F
     assert refused(graph, part, plan) == expected
 
 
-def test_a_plan_that_the_scene_refuses_is_made_anew_in_the_whole_scene(forgetful: Forgetful) -> None:
+def test_a_refused_plan_is_replaced_by_a_plan_for_the_whole_scene(forgetful: Forgetful) -> None:
     scene = confab.load(CASES / "lamps.ttl")
     forgetful.lost = 0
     try:
@@ -128,7 +130,7 @@ def test_a_plan_that_the_scene_refuses_is_made_anew_in_the_whole_scene(forgetful
     assert not validate(result.problem, result.plan)
 
 
-def test_a_goal_on_a_class_that_recognition_loses_a_member_of_is_reached_for_all(
+def test_a_goal_on_a_class_is_achieved_for_all_members_even_if_recognition_loses_one(
     forgetful: Forgetful, tmp_path: Path
 ) -> None:
     text = (CASES / "lamps.ttl").read_text(encoding="utf-8").replace("c:about :lamp2 ;", "c:about :Lamp ;")
@@ -150,7 +152,7 @@ def test_another_order_is_checked_in_the_whole_scene(monkeypatch: pytest.MonkeyP
         result.in_order(*(step.id for step in result.plan.steps))
 
 
-def test_what_may_take_part_is_looked_for_in_the_whole_scene(tmp_path: Path) -> None:
+def test_an_alternative_may_name_any_individual_of_the_whole_scene(tmp_path: Path) -> None:
     scene = confab.generate("served", tmp_path / "table.ttl", objects=4, clutter=5, seed=1)
     result = scene.plan()
     assert "thing1" in scene.problem.individuals - result.problem.individuals
@@ -161,7 +163,7 @@ def test_what_may_take_part_is_looked_for_in_the_whole_scene(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_a_goal_of_which_nothing_is_stated_is_refused_by_name(mode: Mode, tmp_path: Path) -> None:
+def test_a_goal_without_a_definition_is_refused_by_name(mode: Mode, tmp_path: Path) -> None:
     text = (CASES / "lamps.ttl").read_text(encoding="utf-8")
     (tmp_path / "lamps.ttl").write_text(text.replace("c:goal :task.g .", "c:goal :task.g, :task.h ."), encoding="utf-8")
     with pytest.raises(KnowledgeError, match=r"task\.h"):

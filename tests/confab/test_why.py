@@ -39,7 +39,7 @@ def lamps(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "evening.ttl"
 
 
-def test_a_step_is_asked_for_by_number_level_path_and_words(serving: confab.Result) -> None:
+def test_a_step_is_accepted_by_number_level_path_and_words(serving: confab.Result) -> None:
     first = serving.why(0)
     assert (
         serving.why("L1#0") == serving.why("0") == serving.why("move cup 1") == serving.why("22 B1_MOVE cup1 location7")
@@ -50,7 +50,7 @@ def test_a_step_is_asked_for_by_number_level_path_and_words(serving: confab.Resu
 
 
 @pytest.mark.parametrize("asked", ["lift", "L3#99", "9.9", 7, "make tea"])
-def test_what_is_no_step_or_several_is_said(serving: confab.Result, asked: str | int) -> None:
+def test_an_unknown_or_ambiguous_step_is_refused(serving: confab.Result, asked: str | int) -> None:
     with pytest.raises(confab.KnowledgeError, match="step"):
         serving.why(asked)
 
@@ -79,7 +79,9 @@ def test_each_value_of_a_lifted_fact_has_a_sentence_of_its_own(name: str) -> Non
         ("B2_PICK left_hand bottle1", "left hand can reach location 4"),
     ],
 )
-def test_what_cannot_be_done_names_the_condition(serving: confab.Result, asked: str, lacks: str) -> None:
+def test_an_inapplicable_alternative_is_explained_by_its_failing_condition(
+    serving: confab.Result, asked: str, lacks: str
+) -> None:
     assert serving.why_not(asked).lacks == (lacks,)
 
 
@@ -113,7 +115,9 @@ def test_a_saved_plan_keeps_the_soft_goals_that_it_meets(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("asked", ["B1_MOVE cup2 location1", "B2_PICK right_hand cup1", "B1_MOVE bottle1 location6"])
-def test_what_can_be_done_is_planned_to_the_goal_and_costed(serving: confab.Result, asked: str) -> None:
+def test_an_applicable_alternative_gets_a_plan_to_the_goal_and_its_additional_cost(
+    serving: confab.Result, asked: str
+) -> None:
     told = serving.why_not(asked)
     assert told.plan is not None
     assert validate(serving.problem, told.plan) == []
@@ -122,7 +126,9 @@ def test_what_can_be_done_is_planned_to_the_goal_and_costed(serving: confab.Resu
     assert (behavior, tuple(arguments)) in {(s.behavior, s.arguments) for s in told.plan.walk()}
 
 
-def test_what_a_level_above_asks_and_an_alternative_breaks_is_said_first(serving: confab.Result) -> None:
+def test_the_precondition_of_an_upper_level_that_an_alternative_violates_is_reported_first(
+    serving: confab.Result,
+) -> None:
     """A cup that is filled at its present place must then be carried while it is full.
 
     Level 1 forbids this, and level 2 doesn't see it.
@@ -137,14 +143,14 @@ def test_what_a_level_above_asks_and_an_alternative_breaks_is_said_first(serving
     assert told.json()["breaks"] == [broken]
 
 
-def test_an_alternative_that_keeps_its_levels_breaks_nothing(serving: confab.Result) -> None:
+def test_an_alternative_that_keeps_its_levels_violates_no_precondition(serving: confab.Result) -> None:
     told = serving.why_not("cup2 LOCATION location8")
     assert told.plan is not None
     assert told.breaks == ()
     assert "is possible and" in told.answer
 
 
-def test_who_takes_part_can_be_asked(serving: confab.Result) -> None:
+def test_an_alternative_may_name_the_hand_that_takes_part(serving: confab.Result) -> None:
     told = serving.why_not("cup1 LOCATION location7 by right_hand")
     assert told.plan is not None
     moving = [
@@ -156,7 +162,7 @@ def test_who_takes_part_can_be_asked(serving: confab.Result) -> None:
     assert serving.why_not("cup1 LOCATION location7").more == 0
 
 
-def test_another_wish_is_planned_for(serving: confab.Result) -> None:
+def test_another_goal_is_planned_as_an_alternative(serving: confab.Result) -> None:
     told = serving.why_not("cup2 LOCATION location8")
     assert told.more is not None
     assert told.more > 0
@@ -164,7 +170,7 @@ def test_another_wish_is_planned_for(serving: confab.Result) -> None:
 
 
 @pytest.mark.parametrize("asked", ["cup2 LOCATOIN location8", "B1_MOV cup2 location8", "B1_MOVE cup2 nowhere", "hello"])
-def test_what_is_misspelt_is_said(serving: confab.Result, asked: str) -> None:
+def test_a_misspelt_alternative_is_refused(serving: confab.Result, asked: str) -> None:
     with pytest.raises(confab.KnowledgeError):
         serving.why_not(asked)
 
@@ -184,13 +190,13 @@ def test_symbolic_worlds_are_explained(scene: str) -> None:
     assert all(step.needs for step in account.steps)
 
 
-def test_no_plan_is_explained() -> None:
+def test_the_explanation_of_an_unsolvable_task_names_the_contested_place() -> None:
     told = confab.load("beverage-serving").explain(["cup1 LOCATION location7", "cup2 LOCATION location7"])
     assert told.steps == ()
     assert "location7" in told.headline
 
 
-def test_what_proves_that_there_is_no_plan_is_told_in_the_scenes_words() -> None:
+def test_the_proof_that_no_plan_exists_is_explained_in_the_labels_of_the_scene() -> None:
     ward = str(Path(__file__).parents[1] / "planner/cases/reason-key-opens-nothing/ward-small.ttl")
     result = confab.load(ward).plan()
     assert result.certificate is not None
@@ -203,7 +209,7 @@ def test_what_proves_that_there_is_no_plan_is_told_in_the_scenes_words() -> None
     assert "An independent checker has verified this" in shown.output
 
 
-def test_the_command_line_tells_all_of_it() -> None:
+def test_the_command_line_explains_plans_steps_and_alternatives() -> None:
     run = CliRunner().invoke
     assert "the goal requires that cup 1" in run(app, ["explain", "beverage-serving"]).output
     assert "requires that left hand holds cup 1" in run(app, ["explain", "beverage-serving", "L2#0"]).output
@@ -248,7 +254,7 @@ def test_an_alternative_is_given_by_names_or_in_the_words_of_an_explanation(word
     assert str(result.why_not(words)).partition("\n")[0] == str(result.why_not(names)).partition("\n")[0]
 
 
-def test_a_shipped_query_is_offered_where_its_vocabulary_is_used() -> None:
+def test_the_message_on_a_shipped_query_without_its_vocabulary_names_usable_queries() -> None:
     with pytest.raises(confab.KnowledgeError, match=r"a vocabulary that this scene doesn't import; .*what-is-wanted"):
         confab.load("towers-small").query("where-is-everything")
 
