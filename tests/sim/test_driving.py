@@ -28,7 +28,7 @@ def world(embodiment: Embodiment, *fixtures: Fixture, perturb: Perturbation | No
     return PhysicsWorld(more, case("two-tables").initial, beads=False, perturb=perturb)
 
 
-def test_a_robot_that_drives_serves_from_two_tables() -> None:
+def test_a_mobile_robot_serves_from_two_tables() -> None:
     one = case("two-tables")
     assert sum(step.behavior == "D3_DRIVE" for step in one.steps) >= 4
     errand, promised = one.steps[:8], one.expected[:8]  # a cup is fetched from the sideboard and put on the table
@@ -38,7 +38,7 @@ def test_a_robot_that_drives_serves_from_two_tables() -> None:
     assert dict(rollout.state) == dict(promised[-1])
 
 
-def test_the_arms_know_where_the_base_has_come_to(tables: Embodiment) -> None:
+def test_the_arms_use_the_measured_position_of_the_base(tables: Embodiment) -> None:
     with world(tables, perturb=Perturbation()) as here:
         drive(here, "two_arms", "aside")
         away = np.abs(here.bases["two_arms"].pose()[:2] - np.array([-0.8, 0.5])).max()
@@ -49,7 +49,7 @@ def test_the_arms_know_where_the_base_has_come_to(tables: Embodiment) -> None:
             assert np.allclose(found, state[4], atol=1e-5)
 
 
-def test_a_base_goes_round_what_stands_in_its_way(tables: Embodiment) -> None:
+def test_a_mobile_base_drives_around_obstacles(tables: Embodiment) -> None:
     box = Fixture("box", (0.12, 0.12, 0.9), (-0.46, 0.28, 0.45))
     with world(tables, box) as here:
         drive(here, "two_arms", "aside")
@@ -67,7 +67,7 @@ def test_a_base_that_is_walled_in_is_refused_before_it_moves_and_the_walls_are_n
         assert here.steps == 0
 
 
-def test_a_wall_that_a_robot_that_drives_does_not_see_stops_it_and_is_named(tables: Embodiment) -> None:
+def test_an_unseen_wall_stops_a_mobile_robot_and_is_named(tables: Embodiment) -> None:
     with world(tables) as here:
         shape = pybullet.createCollisionShape(
             pybullet.GEOM_BOX, halfExtents=[0.3, 0.02, 0.5], physicsClientId=here.client

@@ -12,7 +12,7 @@ E = "https://w3id.org/confab/embodiment#"
 BODIES = "https://w3id.org/confab/tabletop-bodies#"
 
 
-def test_the_scene_s_bodies_are_read(serving: Case) -> None:
+def test_the_bodies_of_a_scene_are_read(serving: Case) -> None:
     body = serving.embodiment
     assert list(body.bodies) == ["bottle1", "bottle2", "cup1", "cup2"]
     assert body.bodies["cup1"].shape.profile == ((0.0, 0.031), (0.09, 0.037))
@@ -60,7 +60,7 @@ def test_a_wrong_attribute_is_named(subject: str, name: str, value: ox.Literal |
         read_embodiment(changed(subject, name, value), local_name)
 
 
-def test_what_is_said_of_a_behaviour_goes_before_what_is_said_of_its_skill() -> None:
+def test_a_setting_of_a_behaviour_overrides_the_setting_of_its_skill() -> None:
     behavior = "https://w3id.org/confab/tabletop#B3_LIFT"
     number = ox.Literal("0.25", datatype=ox.NamedNode("http://www.w3.org/2001/XMLSchema#decimal"))
     assert read_embodiment(changed(behavior, "raised", number), local_name).skills["B3_LIFT"].numbers["raised"] == 0.25

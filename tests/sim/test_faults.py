@@ -19,7 +19,9 @@ JOINTED = [planted for planted in PLANTED if planted.step == 0 and planted.scene
 
 
 @pytest.mark.parametrize("planted", QUICK, ids=[planted.kind for planted in QUICK])
-def test_a_planted_fault_stops_the_plan_where_and_as_it_must(serving: Case, planted: Planted) -> None:
+def test_a_planted_fault_stops_the_plan_at_the_expected_step_with_the_expected_code(
+    serving: Case, planted: Planted
+) -> None:
     end = planted.step + 1
     trial = Trial(serving.embodiment, serving.initial, serving.steps[:end], serving.expected[:end])
     rollout = planted.run(trial)
@@ -27,15 +29,13 @@ def test_a_planted_fault_stops_the_plan_where_and_as_it_must(serving: Case, plan
 
 
 @pytest.mark.parametrize("planted", JOINTED, ids=[planted.kind for planted in JOINTED])
-def test_a_planted_fault_of_a_thing_with_a_joint_stops_its_first_primitive(planted: Planted) -> None:
+def test_a_planted_fault_of_a_mechanism_stops_its_first_primitive(planted: Planted) -> None:
     trial = nominal(planted.scene)
     rollout = planted.run(replace(trial, steps=trial.steps[:1], expected=trial.expected[:1]))
     assert planted.found(rollout), rollout.failure
 
 
-def test_at_least_fifty_kinds_are_planted_twenty_of_them_with_joints_and_every_one_can_be_sent_to_another_process() -> (
-    None
-):
+def test_at_least_fifty_kinds_of_faults_are_planted_and_all_of_them_can_be_pickled() -> None:
     assert len({planted.kind for planted in PLANTED}) >= 50
     assert sum(planted.scene != "beverage-serving" for planted in PLANTED) >= 20
     assert {planted.fault.kind for planted in PLANTED} == PLANTS.keys()

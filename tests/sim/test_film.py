@@ -21,7 +21,7 @@ def world() -> Iterator[PhysicsWorld]:
         yield world
 
 
-def test_a_name_is_written_only_where_the_thing_is_seen(world: PhysicsWorld) -> None:
+def test_a_film_shows_the_names_of_visible_objects_only(world: PhysicsWorld) -> None:
     film = Film("unwritten.mp4", SCENE.plan().plan.primitives)
     film.camera = view_of(SCENE.embodiment, film.width, film.height, BAR)
     named = film._named(BLANK, world)
@@ -33,7 +33,7 @@ def test_a_name_is_written_only_where_the_thing_is_seen(world: PhysicsWorld) -> 
     assert not (film._named(BLANK, world) == named).all()
 
 
-def test_the_camera_goes_where_the_handle_is_seen(world: PhysicsWorld) -> None:
+def test_the_camera_turns_to_a_side_on_which_the_handle_is_visible(world: PhysicsWorld) -> None:
     """From the other side of the table, the chest hides the drawer's handle."""
     film = Film("unwritten.mp4", [step for step in SCENE.plan().plan.primitives if "drawer" in step.arguments])
     first, handle = view_of(SCENE.embodiment, film.width, film.height, BAR), _points(world, "drawer")[0][0]

@@ -28,7 +28,7 @@ def postures(arm: Arm, count: int) -> Array:
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
-def test_inverse_finds_the_posture_that_forward_came_from(side: str) -> None:
+def test_inverse_kinematics_inverts_forward_kinematics(side: str) -> None:
     arm = arm_of(side)
     q = postures(arm, 500)
     found, valid = inverse(arm, *hand_frames(arm, q), swivel_of(arm, q))
@@ -55,7 +55,7 @@ def test_an_arm_whose_last_axis_passes_the_wrist_has_a_closed_form_too() -> None
     np.testing.assert_allclose(np.cos(swivel_of(arm, found[valid]) - swivel[valid]), 1.0, atol=1e-8)
 
 
-def test_points_at_which_an_arm_is_nearly_stretched_can_be_kept_off() -> None:
+def test_poses_with_a_nearly_stretched_arm_can_be_avoided() -> None:
     for arm in (panda(), arm_of("left")):
         q = np.random.default_rng(0).uniform(arm.lower + 0.05, arm.upper - 0.05, (2000, 7))
         given = (*hand_frames(arm, q), swivel_of(arm, q))
@@ -71,7 +71,7 @@ def test_points_at_which_an_arm_is_nearly_stretched_can_be_kept_off() -> None:
             )
 
 
-def test_the_last_joint_alone_rolls_such_a_hand_while_the_swivel_stays() -> None:
+def test_the_last_joint_alone_rolls_the_hand_if_the_swivel_is_constant() -> None:
     arm = panda()
     roll = np.linspace(0.0, 1.2, 20)
     where = np.broadcast_to([0.3, 0.0, 0.95], (20, 3))
@@ -82,7 +82,7 @@ def test_the_last_joint_alone_rolls_such_a_hand_while_the_swivel_stays() -> None
     assert moves[:6].max() < 1e-6
 
 
-def test_the_elbow_swivel_leaves_the_hand_where_it_is() -> None:
+def test_the_elbow_swivel_does_not_move_the_hand() -> None:
     arm = arm_of("left")
     swivel = np.linspace(-0.5, 1.0, 20)
     where = np.broadcast_to([0.45, 0.2, 0.85], (20, 3))
@@ -93,14 +93,14 @@ def test_the_elbow_swivel_leaves_the_hand_where_it_is() -> None:
     assert np.ptp(q[valid][:, 0]) > 0.1
 
 
-def test_what_is_out_of_the_arm_s_length_is_not_valid() -> None:
+def test_a_pose_beyond_the_length_of_the_arm_is_not_valid() -> None:
     arm = arm_of("left")
     _, valid = inverse(arm, np.eye(3)[None], np.array([[1.2, 0.2, 0.9]]), np.zeros(1))
     assert not valid.any()
 
 
 @pytest.mark.parametrize("axes", [(Y, Z, X), (X, Y, Z), (Z, Y, X), (X, Y, X), (Z, Y, Z), (Z, Y, -X)])
-def test_three_angles_rebuild_any_rotation(axes: tuple[Array, Array, Array]) -> None:
+def test_three_angles_represent_any_rotation(axes: tuple[Array, Array, Array]) -> None:
     draw = np.random.default_rng(1)
     r = turn(X, draw.uniform(-3, 3, 100)) @ turn(Y, draw.uniform(-3, 3, 100)) @ turn(Z, draw.uniform(-3, 3, 100))
     x, y, z = three_angles(r, np.array(axes)).T
@@ -183,7 +183,7 @@ def test_a_file_that_is_no_urdf_is_named(tmp_path: Path) -> None:
         ("</robot>", '<joint name="o"><parent link="base"/><child link="base"/></joint></robot>', "hangs on itself"),
     ],
 )
-def test_a_robot_that_cannot_be_is_refused_in_words(tmp_path: Path, old: str, new: str, said: str) -> None:
+def test_an_invalid_robot_description_is_refused_with_a_message(tmp_path: Path, old: str, new: str, said: str) -> None:
     text = Path(URDF).read_text()
     assert old in text
     file = tmp_path / "broken.urdf"

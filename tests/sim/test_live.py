@@ -28,7 +28,7 @@ def put(individual: str, place: str, **when: float) -> Intervention:
     return Intervention(InterventionKind.WORLD, (Fact(Symbol("LOCATION", (individual,)), place),), **when)  # type: ignore[arg-type]
 
 
-def test_what_nobody_can_do_is_known_beforehand(live: LiveWorld) -> None:
+def test_impossible_interventions_are_recognised_before_execution(live: LiveWorld) -> None:
     held = Intervention(InterventionKind.WORLD, (Fact(Symbol("HOLDS", ("left_hand",)), "cup1"),))
     assert live.impossible(put("cup1", "location6")) is None
     assert "which is no place" in str(live.impossible(put("cup1", "in_hand")))
@@ -39,14 +39,14 @@ def test_what_nobody_can_do_is_known_beforehand(live: LiveWorld) -> None:
     assert "has a shape" in str(live.impossible(Intervention(InterventionKind.ADD, individual="x", kind="Hand")))
 
 
-def test_a_hand_is_not_to_blame_for_what_a_person_moves_meanwhile(live: LiveWorld) -> None:
+def test_a_primitive_does_not_fail_because_a_person_moves_another_object(live: LiveWorld) -> None:
     live.announce((put("cup2", "location6", at=0.4),))
     assert live.execute(REACH).ok
     assert live.observe()[Symbol("LOCATION", ("cup2",))] == "location6"
     assert live.world.moved_by_others == set()
 
 
-def test_a_primitive_stops_when_what_it_concerns_is_taken_away(live: LiveWorld) -> None:
+def test_a_primitive_is_interrupted_when_its_object_is_removed(live: LiveWorld) -> None:
     live.announce((Intervention(InterventionKind.REMOVE, individual="bottle1", at=0.4),))
     verdict = live.execute(REACH)
     assert (verdict.ok, verdict.code) == (False, "interrupted")
@@ -55,14 +55,14 @@ def test_a_primitive_stops_when_what_it_concerns_is_taken_away(live: LiveWorld) 
     assert Symbol("HAND_POSITION", ("right_hand",)) in seen  # the position has a name in any case
 
 
-def test_what_is_gone_is_moved_by_nobody(live: LiveWorld) -> None:
+def test_interventions_on_a_removed_object_change_nothing(live: LiveWorld) -> None:
     gone = Intervention(InterventionKind.REMOVE, individual="cup1")
     for intervention in (gone, gone, put("cup1", "location6")):
         live.disturb(intervention)
     assert "cup1" not in live.world.bodies
 
 
-def test_what_slipped_is_held_the_way_it_is(live: LiveWorld) -> None:
+def test_the_grasp_of_a_slipped_object_is_measured_again(live: LiveWorld) -> None:
     grasp = Step((1,), 29, 3, "B3_GRASP", ("right_hand",), {"object": "bottle1"}, None, ())
     nothing = Step((2,), 30, 3, "B3_PUT_DOWN", ("left_hand",), {"object": "cup1", "location": "location1"}, None, ())
     assert live.execute(REACH).ok
@@ -87,7 +87,7 @@ def test_a_drawer_that_a_person_shuts_is_opened_again() -> None:
     assert [change.kind for change in run.episode.replans] == ["repair"]
 
 
-def test_a_hand_at_whose_handle_a_person_shuts_the_drawer_gets_home() -> None:
+def test_a_hand_at_the_handle_of_a_drawer_that_a_person_shuts_returns_to_its_home_posture() -> None:
     """The hand lies on its side around the handle and can't turn there, so it draws back first."""
     scene = confab.load("kitchen-corner")
     with PhysicsWorld(scene.embodiment, scene.problem.initial, beads=False) as world:
@@ -108,7 +108,7 @@ def handled(change: InterventionKind, individual: str, *numbers: float, place: s
     return Intervention(change, facts, individual=individual, kind="Movable", numbers=numbers)
 
 
-def test_what_stands_beside_its_places_is_at_a_spot_that_the_same_hand_reaches(live: LiveWorld) -> None:
+def test_an_object_beside_its_place_is_at_a_spot_that_the_same_hand_reaches(live: LiveWorld) -> None:
     live.disturb(handled(InterventionKind.PUSH, "cup2", 0.02, 0.08))
     assert live.observe()[LOCATION["cup2"]] == "spot1"
     (spot,) = live.discoveries()
@@ -120,7 +120,7 @@ def test_what_stands_beside_its_places_is_at_a_spot_that_the_same_hand_reaches(l
     assert live.observe()[LOCATION["cup2"]] == "location1"
 
 
-def test_a_thing_of_which_no_fact_speaks_is_fixed_if_no_hand_opens_wide_enough(live: LiveWorld) -> None:
+def test_an_unknown_object_is_fixed_if_no_hand_opens_wide_enough(live: LiveWorld) -> None:
     live.disturb(handled(InterventionKind.BOX, "box1", 0.12, 0.12, 0.2, place="location7"))
     assert live.observe()[LOCATION["box1"]] == "location7"
     (box,) = live.discoveries()
@@ -136,7 +136,7 @@ def test_a_box_that_interrupts_a_primitive_is_seen_before_the_next_simulation_st
     assert live.observe()[LOCATION["box1"]] == "location7"
 
 
-def test_what_lies_is_at_no_place_and_is_said_to_lie(live: LiveWorld) -> None:
+def test_a_lying_object_is_at_no_place_and_is_reported_as_lying(live: LiveWorld) -> None:
     live.disturb(handled(InterventionKind.KNOCK, "cup1"))
     assert LOCATION["cup1"] not in live.observe()
     assert live.why_unplaced("cup1").startswith("lies ")
@@ -144,7 +144,7 @@ def test_what_lies_is_at_no_place_and_is_said_to_lie(live: LiveWorld) -> None:
     assert live.execute(REACH).ok  # only the primitive during which the cup fell would fail because of it
 
 
-def test_room_on_the_table_is_within_reach_and_clear_of_everything(live: LiveWorld) -> None:
+def test_free_spots_on_the_table_are_within_reach_and_clear_of_places(live: LiveWorld) -> None:
     spots = live.free_spots()
     assert spots
     world = live.world
@@ -155,7 +155,7 @@ def test_room_on_the_table_is_within_reach_and_clear_of_everything(live: LiveWor
         assert min(float(np.linalg.norm(point - other)) for other in others) >= 0.1
 
 
-def test_a_timed_fault_that_was_planted_before_happens_in_a_live_world() -> None:
+def test_a_planted_timed_fault_happens_in_a_live_world() -> None:
     scene = confab.load("beverage-serving")
     with PhysicsWorld(scene.embodiment, scene.problem.initial, beads=False) as world:
         knocked("cup2", 0, 0.1)(world)

@@ -25,7 +25,7 @@ def used() -> int:
     return int(ask().used)
 
 
-def test_worlds_that_come_and_go_take_no_memory_and_leave_no_files(serving: Case) -> None:
+def test_closed_worlds_free_their_memory_and_leave_no_files(serving: Case) -> None:
     def come_and_go(times: int) -> None:
         for _ in range(times):
             with PhysicsWorld(serving.embodiment, serving.initial, 0):

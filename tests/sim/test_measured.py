@@ -29,7 +29,7 @@ def stack(tmp_path: Path, bounds: str) -> confab.Scene:
     return confab.load(file)
 
 
-def test_what_is_on_what_is_measured_and_a_difference_is_told_in_numbers(tmp_path: Path) -> None:
+def test_the_relation_on_is_measured_and_a_deviation_is_reported_in_numbers(tmp_path: Path) -> None:
     scene = stack(tmp_path, "beside <= 0.02; over >= -0.004; over <= 0.004; contact >= 0.1")
     with PhysicsWorld(scene.embodiment, scene.problem.initial) as world:
         a_on_b = Symbol("ON", ("a", "b"))
@@ -50,6 +50,6 @@ def test_what_is_on_what_is_measured_and_a_difference_is_told_in_numbers(tmp_pat
         ("beside <= near", "no number 'near'"),
     ],
 )
-def test_a_bound_that_means_nothing_is_refused_with_what_would(tmp_path: Path, bounds: str, words: str) -> None:
+def test_an_invalid_bound_is_refused_with_the_valid_ones(tmp_path: Path, bounds: str, words: str) -> None:
     with pytest.raises(EmbodimentError, match=words):
         _ = stack(tmp_path, bounds).embodiment

@@ -97,7 +97,7 @@ def test_tubes_are_put_into_a_centrifuge_that_is_started_with_its_lid_shut() -> 
     assert (seen["LOCATION", "tube1"], seen["LOCATION", "tube2"]) == ("slot1", "slot2")
 
 
-def test_what_is_in_a_drawer_moves_with_it_and_counts_as_where_it_was() -> None:
+def test_an_object_in_a_drawer_moves_with_it_and_stays_at_its_place() -> None:
     scene = kitchen()
     skills, roles = by_skill(scene.embodiment), {"hand": "right_hand", "object": "drawer"}
     with PhysicsWorld(scene.embodiment, scene.problem.initial, seed=3, perturb=Perturbation(), beads=False) as world:
@@ -113,7 +113,7 @@ def test_what_is_in_a_drawer_moves_with_it_and_counts_as_where_it_was() -> None:
         assert world.observe()[Symbol("OPENED", ("drawer",))] == "false"
 
 
-def test_a_handle_that_one_finger_closes_beside_is_taken_anew_where_the_other_met_it() -> None:
+def test_a_handle_that_one_finger_missed_is_grasped_again_and_the_drawer_opens() -> None:
     scene = kitchen()
     roles = {"hand": "right_hand", "object": "drawer"}
     with PhysicsWorld(scene.embodiment, scene.problem.initial, 7007, Perturbation(), beads=False, noise=0.008) as world:
@@ -137,7 +137,7 @@ def test_fingers_open_less_at_a_handle_with_little_room_beside_it() -> None:
         ("centrifuge", "cover", True, 0.012),
     ],
 )
-def test_a_hand_gives_way_to_what_a_handle_that_seems_farther_is_on(
+def test_a_link_is_operated_even_if_its_handle_seems_farther_away_than_it_is(
     name: str, link: str, opened: bool, off: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene = confab.load(name)
@@ -150,7 +150,7 @@ def test_a_hand_gives_way_to_what_a_handle_that_seems_farther_is_on(
         assert world.observe()[Symbol("OPENED", (link,))] == str(not opened).lower()
 
 
-def test_a_person_who_opens_a_drawer_takes_what_is_in_it_along() -> None:
+def test_objects_in_a_drawer_move_with_it_when_a_person_opens_it() -> None:
     scene = kitchen()
     with PhysicsWorld(scene.embodiment, scene.problem.initial, beads=False) as world:
         before = world.truth("jar")[1]
@@ -170,7 +170,7 @@ def test_a_button_latches_and_comes_out_when_it_is_pressed_again() -> None:
             assert (world.links["button"].values()["button"] > PANEL.links[0].opened) is held
 
 
-def test_a_button_that_resists_too_much_is_given_up_with_the_force() -> None:
+def test_a_button_that_resists_too_much_is_given_up_as_stuck() -> None:
     press, roles = by_skill(kitchen().embodiment)["press"], {"hand": "right_hand", "object": "button"}
     with with_panel(spring=200.0) as world, pytest.raises(SkillError) as failure:
         perform(world, press, roles)
@@ -178,7 +178,7 @@ def test_a_button_that_resists_too_much_is_given_up_with_the_force() -> None:
     assert failure.value.verdict.measured["joint"] < 0.003
 
 
-def test_what_stands_in_the_way_of_a_door_is_named_before_the_hand_moves() -> None:
+def test_an_obstacle_of_a_door_is_named_before_the_hand_moves() -> None:
     scene = kitchen()
     operate, roles = by_skill(scene.embodiment)["operate"], {"hand": "left_hand", "object": "door"}
     with PhysicsWorld(scene.embodiment, scene.problem.initial, beads=False) as world:
@@ -224,7 +224,7 @@ def test_a_knob_is_turned_and_a_door_slides_aside_as_an_author_describes_them(tm
             assert (world.links["valve"].values()["valve"] > 1.0) == (behavior == "F3_OPEN")
 
 
-def test_a_crank_is_turned_around_its_post_where_there_is_no_place_at_all(tmp_path: Path) -> None:
+def test_a_crank_is_turned_in_a_scene_without_places(tmp_path: Path) -> None:
     file = Path(__file__).parents[2] / "docs" / "examples" / "sluice" / "sluice.ttl"
     (tmp_path / file.name).write_text(file.read_text())
     scene = with_reach(confab.load(tmp_path / file.name))
@@ -232,7 +232,7 @@ def test_a_crank_is_turned_around_its_post_where_there_is_no_place_at_all(tmp_pa
     assert str(scene.plan().verify(rollouts=2, perturb=True)).startswith("verified")
 
 
-def test_a_button_that_seems_nearer_than_it_is_is_pressed_through(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_button_that_seems_nearer_than_it_is_is_pressed_completely(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = confab.load("centrifuge")
     press = by_skill(scene.embodiment)["press"]
     with PhysicsWorld(scene.embodiment, scene.problem.initial, beads=False, noise=0.004) as world:
@@ -242,7 +242,7 @@ def test_a_button_that_seems_nearer_than_it_is_is_pressed_through(monkeypatch: p
         assert world.observe()[Symbol("RUNNING", ("start",))] == "true"
 
 
-def test_a_phase_without_its_role_or_setting_is_told_as_ill_defined() -> None:
+def test_a_phase_without_its_role_or_setting_is_reported_as_ill_defined() -> None:
     scene = kitchen()
     operate = by_skill(scene.embodiment)["operate"]
     wrong = replace(operate, phases=(replace(operate.phases[0], to="thing.handle"),))
@@ -254,7 +254,7 @@ def test_a_phase_without_its_role_or_setting_is_told_as_ill_defined() -> None:
             assert failure.value.verdict.code == "ill-defined"
 
 
-def test_validation_finds_a_feature_that_a_link_has_not() -> None:
+def test_validation_finds_a_missing_feature_of_a_link() -> None:
     embodiment = kitchen().embodiment
     operate = embodiment.skills["F3_OPEN"]
     wrong = replace(operate, phases=(replace(operate.phases[0], to="object.knob"),))
@@ -263,7 +263,7 @@ def test_validation_finds_a_feature_that_a_link_has_not() -> None:
     assert list(RULES["unknown-feature"](embodiment)) == []
 
 
-def test_the_model_of_a_mechanism_is_where_physics_has_it() -> None:
+def test_the_model_of_a_mechanism_has_the_poses_of_physics() -> None:
     mechanism = next(one for one in kitchen().embodiment.mechanisms if one.name == "cupboard")
     mechanism = replace(mechanism, yaw=0.3)
     with PhysicsWorld(replace(kitchen().embodiment, mechanisms=(mechanism,), places={}, perceivers={}), {}) as world:
@@ -278,7 +278,7 @@ def test_the_model_of_a_mechanism_is_where_physics_has_it() -> None:
     assert read_mechanism(mechanism).parents["door"].kind == "revolute"
 
 
-def test_the_interpreter_has_all_that_phases_may_say() -> None:
+def test_the_interpreter_supports_all_terms_of_phases() -> None:
     assert {*phases.MOTIONS, "free"} == set(MOTIONS)
     assert set(touch.FINGERS) == set(FINGERS)
     assert set(phases.CONDITIONS) == set(CONDITIONS)
@@ -286,7 +286,7 @@ def test_the_interpreter_has_all_that_phases_may_say() -> None:
     assert set(VERDICTS) == set(CODES)
 
 
-def test_a_joint_that_is_not_open_is_told_as_it_is_perceived_with_its_thresholds() -> None:
+def test_a_joint_that_is_not_open_is_reported_with_its_perceived_value_and_thresholds() -> None:
     scene = kitchen()
     with PhysicsWorld(scene.embodiment, scene.problem.initial) as world:
         before = Verdict(True, measured={"joint": 1.2})
@@ -295,7 +295,7 @@ def test_a_joint_that_is_not_open_is_told_as_it_is_perceived_with_its_thresholds
     assert verdict.measured == pytest.approx({"joint": 0.0, "opened": 1.0, "shut": 0.06}, abs=1e-3)
 
 
-def test_where_on_a_joint_s_path_a_hand_does_not_get_is_told() -> None:
+def test_the_first_unreachable_joint_value_of_a_motion_is_reported() -> None:
     scene = kitchen()
     cupboard, *others = scene.embodiment.mechanisms
     x, y, z = cupboard.position

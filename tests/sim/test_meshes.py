@@ -44,7 +44,7 @@ def test_every_point_of_a_mesh_is_in_a_sphere_and_no_sphere_stands_out_far(name:
         ("a.dae", "<x/>", "neither OBJ nor STL; convert it"),
     ],
 )
-def test_what_is_no_mesh_is_said(tmp_path: Path, name: str, text: str, said: str) -> None:
+def test_an_invalid_mesh_file_is_refused_with_the_reason(tmp_path: Path, name: str, text: str, said: str) -> None:
     (tmp_path / name).write_text(text, encoding="utf-8")
     with pytest.raises(ValueError, match=said):
         triangles(tmp_path / name)
@@ -56,7 +56,7 @@ def test_a_huge_triangle_is_refused_before_it_is_divided(wide: float) -> None:
         surface(np.array([[(0, 0, 0), (wide, 0, 0), (0, wide, 0)]], dtype=float))
 
 
-def test_a_scale_that_leads_out_of_the_world_is_refused(tmp_path: Path) -> None:
+def test_an_excessive_scale_of_a_mesh_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", encoding="utf-8")
     for scale in (1e9, 1e308, float("nan")):
         with pytest.raises(ValueError, match="give its scale in metres"):

@@ -32,13 +32,13 @@ def pillar() -> Solid:
     return Solid("pillar", "cylinder", np.array([0.03, 0.03, 0.2]), np.array([0.45, 0.22, 0.9]), np.eye(3))
 
 
-def test_a_free_line_is_taken_as_it_is(serving: Case) -> None:
+def test_a_collision_free_straight_line_is_the_path(serving: Case) -> None:
     found = connect(reacher(serving.embodiment), START, [GOAL], np.random.default_rng(0))
     assert found is not None
     np.testing.assert_array_equal(found[1], [START, GOAL])
 
 
-def test_a_path_leads_round_what_is_in_the_way(serving: Case) -> None:
+def test_a_path_leads_around_obstacles(serving: Case) -> None:
     blocked = reacher(serving.embodiment, pillar())
     assert blocked.follow(line(START, GOAL)) is None
     assert blocked.blame(line(START, GOAL)).objects == ("pillar",)
@@ -58,7 +58,7 @@ def test_the_same_seed_gives_the_same_path(serving: Case) -> None:
     np.testing.assert_array_equal(first[1], second[1])
 
 
-def test_a_pose_can_be_read_back_from_its_posture(serving: Case) -> None:
+def test_the_pose_of_a_posture_is_the_pose_for_which_it_was_solved(serving: Case) -> None:
     free = reacher(serving.embodiment)
     q, valid = free.solve(START[None])
     assert valid.all()
@@ -89,7 +89,7 @@ def test_a_move_too_short_for_a_third_sample_is_timed_like_a_longer_one(serving:
         assert len(positions) < 60
 
 
-def test_a_hand_that_stands_too_near_to_something_leaves_it_and_never_comes_nearer(serving: Case) -> None:
+def test_a_hand_too_near_to_an_obstacle_moves_away_and_never_nearer(serving: Case) -> None:
     panel = Solid("panel", "box", np.array([0.01, 0.1, 0.1]), START[:3] + np.array([0.02, 0.0, 0.0]), np.eye(3))
     beside = reacher(serving.embodiment, panel)
     assert beside.follow(START[None]) is None
@@ -100,7 +100,7 @@ def test_a_hand_that_stands_too_near_to_something_leaves_it_and_never_comes_near
     assert gaps[-1] > beside.margin
 
 
-def test_a_line_begins_as_far_as_it_is_free(serving: Case) -> None:
+def test_the_begun_part_of_a_blocked_line_is_its_longest_free_part(serving: Case) -> None:
     one = reacher(serving.embodiment)
     down = line(START, START - np.array([0.0, 0.0, 0.3, 0.0, 0.0, 0.0]))
     assert one.follow(down) is None
@@ -110,7 +110,7 @@ def test_a_line_begins_as_far_as_it_is_free(serving: Case) -> None:
     assert one.follow(down[: len(begun) + 1]) is None
 
 
-def test_a_search_grows_from_all_goals_at_once_and_says_which_one_it_came_to(serving: Case) -> None:
+def test_a_path_search_with_several_goals_returns_the_reached_goal(serving: Case) -> None:
     blocked = reacher(serving.embodiment, pillar())
     far = GOAL + np.array([0.0, 0.0, 5.0, 0.0, 0.0, 0.0])  # no hand reaches this pose
     found = connect(blocked, START, [far, GOAL], np.random.default_rng(3))
@@ -119,7 +119,7 @@ def test_a_search_grows_from_all_goals_at_once_and_says_which_one_it_came_to(ser
     np.testing.assert_array_equal(found[1][-1], GOAL)
 
 
-def test_postures_that_touch_nothing_are_those_whose_distances_say_so(serving: Case) -> None:
+def test_free_postures_are_those_with_distances_above_the_margin(serving: Case) -> None:
     here = reacher(serving.embodiment, pillar())
     ball = Spheres(np.array([[0.3, 0.1, 0.9], [0.5, -0.2, 0.8]]), np.array([0.05, 0.08]))
     around = here.around.plus("ball", ball)
@@ -141,7 +141,7 @@ def test_a_goal_in_collision_is_never_come_to(serving: Case) -> None:
     assert connect(blocked, START, [beside[first]], np.random.default_rng(0), attempts=300) is None
 
 
-def test_a_goal_beyond_a_joint_s_limit_is_never_come_to(serving: Case) -> None:
+def test_a_goal_beyond_the_limit_of_a_joint_is_never_reached(serving: Case) -> None:
     """A search that grew from this goal would end there, and the hand could plan no further motion from that pose."""
     blocked = reacher(serving.embodiment, pillar())
     bent = START.copy()
@@ -150,7 +150,7 @@ def test_a_goal_beyond_a_joint_s_limit_is_never_come_to(serving: Case) -> None:
     assert connect(blocked, START, [bent], np.random.default_rng(0), attempts=300) is None
 
 
-def test_what_a_hand_carries_is_covered_down_to_its_lower_edge() -> None:
+def test_the_spheres_of_a_carried_object_cover_its_lower_edge() -> None:
     one = case("beverage-serving")
     with PhysicsWorld(one.embodiment, one.initial, beads=False) as world:
         hand = world.hands["left_hand"]
@@ -178,7 +178,7 @@ def put_beside(attempt: Attempt, q: Array, gap: float) -> None:
 
 
 @pytest.mark.parametrize(("gap", "enough"), [(0.01, True), (0.004, True), (0.001, False)])
-def test_where_nothing_else_is_left_a_hand_makes_do_with_less_room(moved: Case, gap: float, enough: bool) -> None:
+def test_a_hand_accepts_a_smaller_clearance_if_no_alternative_exists(moved: Case, gap: float, enough: bool) -> None:
     with PhysicsWorld(moved.embodiment, moved.initial, beads=False) as world:
         attempt = Attempt.begin(world, "left_hand")
         pose = attempt.hand.pose
@@ -190,7 +190,7 @@ def test_where_nothing_else_is_left_a_hand_makes_do_with_less_room(moved: Case, 
                 attempt.choose([Stage(pose[None])], ())
 
 
-def test_corners_are_rounded_only_as_far_as_the_path_keeps_off_everything(serving: Case) -> None:
+def test_corners_of_a_path_are_rounded_only_as_far_as_obstacles_permit(serving: Case) -> None:
     """Some posts beside a path are far enough from the path, but would be too near to the rounded path."""
     corner, aside, down = np.array([0.45, 0.2, 0.95, 0.0, 0.0, 0.6]), np.eye(6)[1], np.eye(6)[2]
     alone = replace(reacher(serving.embodiment), around=Surroundings())

@@ -29,14 +29,14 @@ def shuffled(case: Case, seed: int) -> State:
 
 
 @pytest.mark.parametrize("seed", range(5000, 5006))
-def test_random_worlds_are_perceived_as_they_were_set_up_in_spite_of_noise(serving: Case, seed: int) -> None:
+def test_random_worlds_are_perceived_correctly_despite_noise(serving: Case, seed: int) -> None:
     truth = shuffled(serving, seed)
     with PhysicsWorld(serving.embodiment, truth, seed, Perturbation(), noise=0.002) as world:
         for _ in range(5):
             assert dict(world.observe()) == dict(truth)
 
 
-def test_what_lies_or_stands_beside_every_place_is_at_none(serving: Case) -> None:
+def test_an_object_that_lies_or_stands_beside_its_place_is_at_no_place(serving: Case) -> None:
     where = {s.arguments[0]: s for s in serving.initial if s.situation == "LOCATION"}
     for plant, name in ((lying("cup1"), "cup1"), (displaced("cup2", (0.08, 0.0)), "cup2")):
         with PhysicsWorld(serving.embodiment, serving.initial, beads=False) as world:
@@ -66,7 +66,7 @@ def test_errors_of_perception_under_strong_noise_are_counted_not_hidden() -> Non
     assert tally.missed["LOCATION", 0.02] > tally.missed["LOCATION", 0.005]
 
 
-def test_what_is_not_as_expected_is_looked_at_again_and_what_is_not_so_stays_found(moved: Case) -> None:
+def test_an_unexpected_perception_is_repeated_and_a_real_deviation_is_still_found(moved: Case) -> None:
     wanted = {symbol: value for symbol, value in moved.initial.items() if symbol.situation == "LOCATION"}
     symbol = next(iter(wanted))
     who = symbol.arguments[0]

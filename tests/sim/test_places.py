@@ -44,7 +44,7 @@ def test_perturbed_rollouts_verify(name: str, noise: float, seed: int, tmp_path:
     assert rollout.ok, rollout.failure
 
 
-def test_a_pot_that_carries_a_place_is_not_at_its_own_place_and_what_is_in_the_pot_is(tmp_path: Path) -> None:
+def test_a_pot_that_carries_a_place_is_not_at_its_own_place_and_an_object_in_the_pot_is(tmp_path: Path) -> None:
     one = scene("pots", tmp_path)
     with PhysicsWorld(one.embodiment, one.problem.initial, 3, Perturbation()) as world:
         seen = {
@@ -86,7 +86,7 @@ def test_a_hand_lifts_to_the_height_that_the_board_above_leaves(tmp_path: Path) 
         assert np.hypot(*lifted[:2]) < 0.02
 
 
-def test_what_stands_on_a_load_belongs_to_the_load_and_is_no_obstacle(tmp_path: Path) -> None:
+def test_an_object_on_a_load_belongs_to_the_load_and_is_no_obstacle(tmp_path: Path) -> None:
     one = scene("tray", tmp_path)
     at = {"tray": "p1", "tin1": "s1", "tin2": "s2"}
     state = {
@@ -119,7 +119,7 @@ def test_a_place_on_a_body_that_is_out_of_reach_is_refuted_where_the_body_stands
     assert "tray LOCATION p1" in map(str, verdict.facts)
 
 
-def test_a_collision_is_told_with_the_body_the_millimetres_and_the_phase(tmp_path: Path) -> None:
+def test_a_collision_is_reported_with_the_body_the_millimetres_and_the_phase(tmp_path: Path) -> None:
     one = scene("peg", tmp_path)
     with PhysicsWorld(one.embodiment, one.problem.initial) as world:
         stranger((0.42, 0.19, 0.7), (0.3, 0.06, 0.2))(world)
@@ -129,7 +129,7 @@ def test_a_collision_is_told_with_the_body_the_millimetres_and_the_phase(tmp_pat
     )
 
 
-def test_a_box_is_as_wide_for_motion_planning_as_it_is(tmp_path: Path) -> None:
+def test_motion_planning_uses_the_actual_width_of_a_box(tmp_path: Path) -> None:
     one = scene("stack", tmp_path)
     with PhysicsWorld(one.embodiment, one.problem.initial) as world:
         (block,) = [solid for solid in world.surroundings("left_hand").solids if solid.name == "a"]

@@ -100,7 +100,7 @@ def test_a_bottle_of_four_servings_fills_three_cups_and_is_seen_to_have_one_left
     assert without.failure is None  # without beads, servings are counted
 
 
-def test_a_full_bottle_that_gushes_gives_one_serving_all_the_same() -> None:
+def test_a_full_bottle_that_gushes_still_gives_one_serving() -> None:
     one = case("three-cups")
     first = next(i for i, step in enumerate(one.steps) if step.behavior == "B3_TILT") + 1
     steps, expected = one.steps[:first], one.expected[:first]
@@ -137,7 +137,7 @@ def test_a_wall_that_the_robot_does_not_see_stops_it_and_is_named(serving: Case)
     assert report.verdict.measured["joint_lag_rad"] > 0.05
 
 
-def test_a_step_whose_promise_the_world_does_not_keep_fails(serving: Case) -> None:
+def test_a_step_whose_expected_effect_does_not_occur_fails(serving: Case) -> None:
     symbol = next(s for s in serving.initial if s.situation == "HOLDS" and s.arguments == ("left_hand",))
     promised = [{**state, symbol: "cup2"} for state in serving.expected]
     rollout = verify(serving.embodiment, serving.initial, serving.steps[:1], promised[:1], beads=False)
@@ -146,7 +146,7 @@ def test_a_step_whose_promise_the_world_does_not_keep_fails(serving: Case) -> No
     assert rollout.failure.verdict.objects == ("left_hand", "cup2", "nothing")
 
 
-def test_a_new_world_is_perceived_as_the_facts_that_it_was_set_up_with(serving: Case, moved: Case) -> None:
+def test_a_new_world_is_perceived_with_its_initial_facts(serving: Case, moved: Case) -> None:
     for one in (serving, moved):
         with PhysicsWorld(one.embodiment, one.initial) as world:
             assert dict(world.observe()) == dict(one.initial)
@@ -161,7 +161,7 @@ def test_the_beverage_can_be_seen_through_the_glass(serving: Case) -> None:
     assert np.sum(np.abs(images[0] - images[1]).max(-1) > 40) > 60
 
 
-def test_a_film_has_a_frame_for_every_moment_and_a_still_per_primitive(serving: Case, tmp_path: Path) -> None:
+def test_a_film_is_written_with_a_still_per_primitive(serving: Case, tmp_path: Path) -> None:
     path = tmp_path / "film.mp4"
     with Film(path, serving.steps, width=320, height=192, frames=10, stills=tmp_path / "stills") as film:
         verify(serving.embodiment, serving.initial, serving.steps[:1], serving.expected[:1], beads=False, watch=film)
@@ -184,7 +184,7 @@ def test_a_film_may_be_a_gif_with_caption_and_plan_strip_in_every_frame(serving:
     assert done[0] == 0 < done[-1]
 
 
-def test_a_vessel_of_clay_hides_what_is_behind_it_and_a_nearer_thing_hides_it(serving: Case) -> None:
+def test_an_opaque_vessel_occludes_the_background_and_is_occluded_by_nearer_objects(serving: Case) -> None:
     shape = next(body.shape for body in serving.embodiment.bodies.values() if body.shape.kind == "vessel")
     clay = replace(shape, color=(0.8, 0.4, 0.2, 1.0))
     camera = Camera((1.0, 0.0, 0.3), (0.0, 0.0, 0.05), 20.0, 120, 80)
@@ -203,7 +203,7 @@ def test_a_vessel_of_clay_hides_what_is_behind_it_and_a_nearer_thing_hides_it(se
 
 
 @pytest.mark.parametrize("scene", ["panda-pair-serving", "iiwa-serving", "xarm-serving", "two-tables"])
-def test_robots_at_rest_are_wholly_in_the_picture(scene: str) -> None:
+def test_robots_at_rest_are_completely_in_the_picture(scene: str) -> None:
     """This also holds for a robot that consists of a single arm, and for each of several robots."""
     embodiment = case(scene).embodiment
     camera = view_of(embodiment)

@@ -20,7 +20,7 @@ def servo_at(angle: float) -> tuple[_Servo, Any]:
     return _Servo(world, hand, _Way(np.array([0.0, 3.0]), np.array([[0.0], [3.0]])), angle), world
 
 
-def test_what_has_stopped_flowing_and_is_nearly_enough_is_enough() -> None:
+def test_an_almost_complete_amount_suffices_when_the_flow_has_stopped() -> None:
     servo, world = servo_at(1.7)
 
     def poured() -> float:
@@ -31,7 +31,7 @@ def test_what_has_stopped_flowing_and_is_nearly_enough_is_enough() -> None:
     assert poured() == 0.9
 
 
-def test_where_the_flow_stops_short_the_hand_turns_on() -> None:
+def test_the_hand_rolls_on_when_the_flow_stops_early() -> None:
     servo, world = servo_at(1.7)
 
     def poured() -> float:

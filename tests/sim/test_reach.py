@@ -6,7 +6,7 @@ from confab.sim.reach import fingerprint, hindrance, reach
 from .conftest import Case
 
 
-def test_reach_comes_out_of_the_robot_s_geometry(serving: Case) -> None:
+def test_reach_follows_from_the_geometry_of_the_robot(serving: Case) -> None:
     found = reach(serving.embodiment)
     for hand, places in (("left_hand", "123567"), ("right_hand", "234678")):
         assert {place for by, place in found.pairs if by == hand} == {f"location{i}" for i in places}
@@ -19,7 +19,7 @@ def test_a_table_that_stands_further_away_is_reached_less(serving: Case) -> None
     assert reach(away).pairs < reach(serving.embodiment).pairs
 
 
-def test_the_fingerprint_changes_with_what_reach_depends_on_and_with_nothing_else(serving: Case) -> None:
+def test_the_fingerprint_of_reach_changes_exactly_with_its_inputs(serving: Case) -> None:
     body = serving.embodiment
     (name, place), *_ = body.places.items()
     moved = replace(body, places={**body.places, name: replace(place, position=(0.41, 0.44, 0.7))})
@@ -29,7 +29,7 @@ def test_the_fingerprint_changes_with_what_reach_depends_on_and_with_nothing_els
     assert fingerprint(replace(body, bodies=repainted)) == fingerprint(body)
 
 
-def test_what_keeps_a_hand_from_a_place_is_named_with_stage_object_and_height(serving: Case) -> None:
+def test_the_hindrance_of_a_place_is_named_with_stage_object_and_height(serving: Case) -> None:
     name = "location5"
     assert hindrance(serving.embodiment, name) == (
         "right_hand: 9.9 cm out of reach when grasping cup1, 50 mm above its base",
@@ -40,7 +40,7 @@ def test_what_keeps_a_hand_from_a_place_is_named_with_stage_object_and_height(se
         )
 
 
-def test_a_hand_lifts_less_where_a_solid_above_leaves_room_for_the_load_alone(serving: Case) -> None:
+def test_a_hand_reaches_a_place_below_a_solid_if_there_is_room_for_the_lifted_load(serving: Case) -> None:
     assert ("left_hand", "location5") in reach(below_a_lamp(serving, 0.25)).pairs
     assert ("left_hand", "location5") not in reach(below_a_lamp(serving, 0.2)).pairs
 
@@ -55,7 +55,7 @@ def test_a_place_on_a_movable_body_is_reached_if_it_is_reached_above_some_place(
     assert {place for _, place in reach(away).pairs if place.startswith("on_")} == {"on_cup2"}
 
 
-def test_a_height_at_which_no_hand_takes_anything_excludes_no_place(serving: Case) -> None:
+def test_a_height_without_a_possible_grasp_excludes_no_place(serving: Case) -> None:
     body, cup = serving.embodiment, serving.embodiment.bodies["cup1"]
     flat = replace(cup, name="coin", shape=replace(cup.shape, grasp_height=0.01))
     assert reach(replace(body, bodies={**body.bodies, "coin": flat})).pairs == reach(body).pairs

@@ -42,7 +42,9 @@ def die(world: PhysicsWorld) -> None:
     os._exit(9)
 
 
-def test_two_processes_give_what_one_gives_seed_by_seed_though_one_of_them_dies(serving: Case, tmp_path: Path) -> None:
+def test_two_processes_give_the_results_of_one_for_each_seed_even_if_one_process_dies(
+    serving: Case, tmp_path: Path
+) -> None:
     trial = first_steps(serving)
     alone, seen = rollouts(trial, SEEDS), list[int]()
     dying = Trial(**{**vars(trial), "prepare": functools.partial(die_once, tmp_path / "died")})
@@ -53,20 +55,20 @@ def test_two_processes_give_what_one_gives_seed_by_seed_though_one_of_them_dies(
     assert len({rollout.steps[1].verdict.measured["force_n"] for rollout in alone}) == len(SEEDS)
 
 
-def test_a_rollout_at_which_every_process_dies_is_given_up_by_name(serving: Case) -> None:
+def test_a_rollout_in_which_every_process_dies_is_given_up_and_named(serving: Case) -> None:
     trial = Trial(**{**vars(first_steps(serving, 0)), "prepare": die})
     with pytest.raises(RuntimeError, match=r"seed 500\d was given up: 3 processes died at it"):
         rollouts(trial, SEEDS[:2], 2)
 
 
-def test_what_a_process_raises_is_raised_here(serving: Case) -> None:
+def test_an_error_in_a_worker_process_is_raised_in_the_caller(serving: Case) -> None:
     trial = Trial(**{**vars(first_steps(serving)), "expected": serving.expected[:1]})
     with pytest.raises(ValueError, match="shorter"):
         rollouts(trial, SEEDS[:2], 2)
 
 
 @pytest.mark.parametrize("workers", [0, "-1", "many", "http://somewhere"])
-def test_workers_that_are_none_are_refused_by_name(serving: Case, workers: int | str) -> None:
+def test_an_invalid_value_of_workers_is_refused_by_name(serving: Case, workers: int | str) -> None:
     with pytest.raises(ValueError, match=f"workers '{workers}'"):
         rollouts(first_steps(serving), SEEDS, workers)
 
@@ -78,7 +80,7 @@ def test_the_confidence_interval_is_wilson_s() -> None:
 
 
 @pytest.mark.filterwarnings("ignore")
-def test_a_ray_cluster_of_two_nodes_gives_the_same_though_a_worker_dies(serving: Case, tmp_path: Path) -> None:
+def test_a_ray_cluster_of_two_nodes_gives_the_same_results_even_if_a_worker_dies(serving: Case, tmp_path: Path) -> None:
     pytest.importorskip("ray")
     from ray.cluster_utils import Cluster
 

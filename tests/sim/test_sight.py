@@ -49,7 +49,7 @@ def with_hollow_pot() -> Embodiment:
     return replace(body, mechanisms=(*furniture, pot), places={**body.places, **places})
 
 
-def test_what_is_in_a_shut_cupboard_is_believed_and_seen_once_it_is_open() -> None:
+def test_an_object_in_a_shut_cupboard_is_believed_and_perceived_after_the_door_opens() -> None:
     with PhysicsWorld(kitchen().embodiment, kitchen().problem.initial) as world:
         state = world.observe()
         assert state[CUP] == "shelf"
@@ -61,7 +61,7 @@ def test_what_is_in_a_shut_cupboard_is_believed_and_seen_once_it_is_open() -> No
         assert covered(world, "cup") == "false"
 
 
-def test_what_is_under_a_lid_is_believed_and_seen_once_the_lid_is_off() -> None:
+def test_an_object_under_a_lid_is_believed_and_perceived_after_the_lid_is_removed() -> None:
     initial = {**kitchen().problem.initial, JAR: "in_pot", LID: "pot_top"}
     with PhysicsWorld(with_hollow_pot(), initial) as world:
         assert not world.perceives("jar")
@@ -72,7 +72,7 @@ def test_what_is_under_a_lid_is_believed_and_seen_once_the_lid_is_off() -> None:
         assert world.observe()[JAR] == "in_pot"
 
 
-def test_what_is_in_a_shut_drawer_goes_with_it_in_belief_and_is_seen_once_it_is_open() -> None:
+def test_the_believed_position_of_an_object_moves_with_its_drawer_and_is_perceived_when_it_is_open() -> None:
     body = replace(kitchen().embodiment, cameras=((0.62, -0.4, 2.0),))
     with PhysicsWorld(body, kitchen().problem.initial) as world:
         assert not world.perceives("jar")
@@ -87,7 +87,7 @@ def test_what_is_in_a_shut_drawer_goes_with_it_in_belief_and_is_seen_once_it_is_
         assert world.observe()[JAR] == "compartment"
 
 
-def test_what_was_taken_out_meanwhile_is_believed_to_be_there_until_it_is_uncovered() -> None:
+def test_a_removed_hidden_object_is_believed_to_be_there_until_its_place_is_uncovered() -> None:
     with PhysicsWorld(kitchen().embodiment, kitchen().problem.initial) as world:
         take_away(world, "cup")
         assert world.observe()[CUP] == "shelf"
@@ -97,7 +97,7 @@ def test_what_was_taken_out_meanwhile_is_believed_to_be_there_until_it_is_uncove
             world.sense("cup")
 
 
-def test_what_was_moved_within_a_shut_cupboard_is_noticed_when_it_is_opened() -> None:
+def test_a_motion_within_a_shut_cupboard_is_perceived_when_the_door_opens() -> None:
     with PhysicsWorld(kitchen().embodiment, kitchen().problem.initial) as world:
         displaced("cup", (0.0, -0.07))(world)
         world.run(30)
@@ -107,7 +107,7 @@ def test_what_was_moved_within_a_shut_cupboard_is_noticed_when_it_is_opened() ->
         assert world.sense("cup")[1] - believed == pytest.approx([0.0, -0.07, 0.0], abs=0.005)
 
 
-def test_a_plan_stops_where_uncovering_shows_that_the_belief_is_wrong() -> None:
+def test_a_plan_stops_when_an_opened_door_shows_that_a_belief_is_wrong() -> None:
     scene = kitchen()
     steps = scene.plan().plan.primitives[:1]
     assert steps[0].behavior == "F3_OPEN"
@@ -124,7 +124,7 @@ def test_a_plan_stops_where_uncovering_shows_that_the_belief_is_wrong() -> None:
     assert CUP not in rollout.state
 
 
-def test_the_verdict_of_a_goal_that_is_hidden_says_that_it_was_not_seen() -> None:
+def test_the_report_on_a_hidden_goal_says_that_it_was_not_seen() -> None:
     scene = kitchen()
     plan = Plan(())
     with PhysicsWorld(scene.embodiment, scene.problem.initial) as world:

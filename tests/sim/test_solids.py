@@ -60,7 +60,7 @@ def test_a_joint_is_swept_against_its_case_and_its_neighbours(
     assert any(said in what for what in changed(embodiment, link, **new)), changed(embodiment, link, **new)
 
 
-def test_a_link_behind_a_shut_neighbour_is_no_fault_since_the_neighbour_opens() -> None:
+def test_a_link_behind_a_shut_neighbour_is_no_fault_if_the_neighbour_opens() -> None:
     embodiment = confab.load("kitchen-corner").embodiment
     cupboard = next(one for one in embodiment.mechanisms if one.name == "cupboard")
     (door,) = cupboard.links
@@ -83,7 +83,7 @@ def test_a_link_behind_a_shut_neighbour_is_no_fault_since_the_neighbour_opens() 
         ("overlap.ttl", "b is 25 mm inside a initially, at p2"),
     ],
 )
-def test_a_world_in_which_solids_overlap_at_first_is_not_begun(file: str, said: str) -> None:
+def test_a_world_with_initially_overlapping_solids_is_refused(file: str, said: str) -> None:
     scene = confab.load(WRONG / file)
     with pytest.raises(ValueError, match=re.escape(said)):
         PhysicsWorld(scene.embodiment, scene.problem.initial)
@@ -121,7 +121,7 @@ def test_a_drawer_does_not_slide_through_a_shut_door() -> None:
             assert (value > 0.1) == opened, value
 
 
-def test_mechanisms_that_have_been_made_wrong_are_refused_and_harmless_changes_are_not() -> None:
+def test_wrong_mutants_of_mechanisms_are_refused_and_harmless_mutants_are_accepted() -> None:
     wrong = harmless = 0
     for mutant in solids.mutants(seed=7):
         if mutant.depth >= solids.WRONG:

@@ -16,7 +16,9 @@ from confab.sim.world import PhysicsWorld
 
 
 @pytest.mark.parametrize("off", [(0.0, -0.004), (0.006, 0.0), (-0.006, 0.0)])
-def test_a_hand_with_little_room_takes_what_stands_elsewhere_than_it_is_seen(off: tuple[float, float]) -> None:
+def test_a_hand_with_little_room_grasps_an_object_that_is_perceived_at_a_wrong_position(
+    off: tuple[float, float],
+) -> None:
     scene = confab.load("panda-serving")
     steps = scene.plan().plan.primitives[:3]
     expected = expectations(scene.problem, steps)
@@ -25,7 +27,7 @@ def test_a_hand_with_little_room_takes_what_stands_elsewhere_than_it_is_seen(off
     assert rollout.failure is None
 
 
-def test_what_is_put_down_is_let_go_when_it_stands_even_where_the_table_is_lower_than_it_seems() -> None:
+def test_an_object_is_released_when_it_stands_even_if_the_table_is_lower_than_perceived() -> None:
     scene = confab.load("beverage-serving")
     steps = scene.plan().plan.primitives[:5]
     place = steps[3].arguments[-1]
@@ -45,7 +47,7 @@ def test_what_is_put_down_is_let_go_when_it_stands_even_where_the_table_is_lower
     assert heights[0] == pytest.approx(seem.position[2], abs=0.003)
 
 
-def test_a_body_is_seen_where_it_was_until_things_move_and_nearer_than_a_single_look_tells() -> None:
+def test_the_perceived_position_of_a_resting_body_is_constant_and_averages_several_looks() -> None:
     scene = confab.load("beverage-serving")
     with PhysicsWorld(scene.embodiment, scene.problem.initial, beads=False, noise=0.01) as world:
         assert np.array_equal(world.sense("cup1")[1], world.sense("cup1")[1])
@@ -56,7 +58,7 @@ def test_a_body_is_seen_where_it_was_until_things_move_and_nearer_than_a_single_
         assert np.std(seen) == pytest.approx(0.01 / np.sqrt(6), rel=0.1)
 
 
-def test_looks_at_a_mechanism_again_are_averaged() -> None:
+def test_repeated_looks_at_a_mechanism_are_averaged() -> None:
     scene = confab.load("kitchen-corner")
     with PhysicsWorld(scene.embodiment, scene.problem.initial, beads=False, noise=0.01) as world:
         seen = []
@@ -67,7 +69,7 @@ def test_looks_at_a_mechanism_again_are_averaged() -> None:
         assert np.std(seen) == pytest.approx(0.01 / np.sqrt(18), rel=0.1)
 
 
-def test_a_straight_line_that_the_elbow_is_in_the_way_of_is_gone_with_the_elbow_turning(
+def test_a_straight_line_blocked_by_the_elbow_is_followed_with_a_turning_elbow(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     scene = confab.load("panda-serving")

@@ -39,7 +39,7 @@ def test_three_stacked_blocks_verify(stack: Scene) -> None:
     assert str(report).startswith("verified"), report
 
 
-def test_a_hand_that_was_stopped_on_its_way_is_at_nothing_that_has_a_name(world: PhysicsWorld) -> None:
+def test_a_hand_stopped_in_motion_is_at_no_named_place(world: PhysicsWorld) -> None:
     assert world.observe()[POSITION] == "raised"
     world.hands["left_hand"].limit = 1.0
 
@@ -59,6 +59,6 @@ def test_a_hand_is_no_longer_at_an_object_that_has_been_moved(world: PhysicsWorl
     assert POSITION not in world.observe()
 
 
-def test_a_place_that_is_carried_is_at_0_where_no_coordinate_is_stated(stack: Scene, world: PhysicsWorld) -> None:
+def test_an_unstated_coordinate_of_a_carried_place_is_0(stack: Scene, world: PhysicsWorld) -> None:
     assert stack.embodiment.places["p4"].position == (0.0, 0.0, 0.095)
     np.testing.assert_allclose(world.place("p4")[:2], world.truth("b")[1][:2], atol=1e-4)
