@@ -19,7 +19,8 @@ from itertools import product
 from typing import Generic, TypeAlias, TypeVar
 
 from confab.planner.certificates import Certificate
-from confab.planner.possibilities import Lowest, Range, Reading, WorkLimitError, variables
+from confab.planner.checked_conditions import variables
+from confab.planner.possibilities import Lowest, Range, Reading, WorkLimitError
 from confab.reasoner.amounts import bounds, number, written
 from confab.reasoner.symbols import FALSE, TRUE, Behavior, Fact, Problem, Symbol
 

@@ -8,8 +8,9 @@ from fractions import Fraction
 
 from confab.planner.certificate_checks import CaseView, Claims, own_variables, unified
 from confab.planner.certificates import Certificate
+from confab.planner.checked_conditions import variables
 from confab.planner.plan import Reason
-from confab.planner.possibilities import ANYTHING, Lowest, Range, Reading, WorkLimitError, compared, variables
+from confab.planner.possibilities import ANYTHING, Lowest, Range, Reading, WorkLimitError, compared
 from confab.reasoner.amounts import MORE, Expression, bounds, terms_of, towards, written
 from confab.reasoner.sentences import an, said
 from confab.reasoner.symbols import (

@@ -35,7 +35,8 @@ from confab.planner.certificate_checks import (
     wanted_in_the_end,
 )
 from confab.planner.certificates import Certificate
-from confab.planner.possibilities import Lowest, NoTimeLeftError, Range, Reading, WorkLimitError, variables
+from confab.planner.checked_conditions import variables
+from confab.planner.possibilities import Lowest, NoTimeLeftError, Range, Reading, WorkLimitError
 from confab.planner.validation import BehaviorReader, Facts
 from confab.reasoner.amounts import meets, number, written
 from confab.reasoner.symbols import FALSE, TRUE, AmountEffect, Behavior, Effect, Fact, Problem, State, Symbol

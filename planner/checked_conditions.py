@@ -91,8 +91,8 @@ class ConditionReader:
         nested = [c for c in conditions if isinstance(c, AnyOf | Witness)]
         tests: list[Test] = []
         while waiting:
-            condition = min(waiting, key=lambda c: (len(variables_of(c) - bound), _breadth(c, bound)))
-            unknown = sorted(variables_of(condition) - bound)
+            condition = min(waiting, key=lambda c: (len(variables(c) - bound), _breadth(c, bound)))
+            unknown = sorted(variables(condition) - bound)
             bound.update(unknown[:1])
             if not unknown:
                 waiting.remove(condition)
@@ -142,8 +142,8 @@ class ConditionReader:
 
         An individual that the problem doesn't contain keeps its values, because no step names the individual.
         """
-        asked = tuple(c for c in conditions if variable in variables_of(c) <= bound)
-        known = tuple(sorted(set().union(*map(variables_of, asked)) - {variable}))
+        asked = tuple(c for c in conditions if variable in variables(c) <= bound)
+        known = tuple(sorted(set().union(*map(variables, asked)) - {variable}))
         assert self.rules.lookups is not None
         rows, key = self.rules.lookups.setdefault((Witness(variable, kind, asked), known), set()), self.key(known)
 
@@ -221,11 +221,11 @@ def _breadth(condition: Condition, bound: set[str]) -> int:
     The rank is 0 if the state determines the individual, 1 if there are few candidates, otherwise 2.
     """
     if isinstance(condition, ValueCondition) and not condition.negated:
-        return not (variables_of(condition) - bound == {condition.value} and condition.value not in condition.arguments)
+        return not (variables(condition) - bound == {condition.value} and condition.value not in condition.arguments)
     return 1 if isinstance(condition, RelationCondition) and not condition.negated else 2
 
 
-def variables_of(condition: Condition) -> set[str]:
+def variables(condition: Condition) -> set[str]:
     """Return the variables of a condition without nested conditions."""
     match condition:
         case ValueCondition(_, arguments, value):

@@ -15,6 +15,7 @@ from functools import partial
 from time import perf_counter
 from typing import Protocol, TypeAlias
 
+from confab.planner.checked_conditions import variables
 from confab.planner.checked_definitions import Definitions, stratum_of
 from confab.reasoner.amounts import (
     Amount,
@@ -25,7 +26,6 @@ from confab.reasoner.amounts import (
     bounds,
     number,
     situations_in,
-    terms_of,
 )
 from confab.reasoner.limits import current
 from confab.reasoner.symbols import (
@@ -523,24 +523,6 @@ class Reading:
 
 
 OPERATORS = {"scale": "*", "increase": "+", "decrease": "-"}
-
-
-def variables(condition: Condition) -> set[str]:
-    """Return the variables of a condition without nested conditions."""
-    match condition:
-        case ValueCondition(_, arguments, value):
-            terms: set[str] = {*arguments, value}
-        case RelationCondition(_, arguments):
-            terms = set(arguments)
-        case ClassCondition(term):
-            terms = {term}
-        case EqualityCondition(left, right):
-            terms = {left, right}
-        case Comparison(one, _, other):
-            terms = {*terms_of(one), *terms_of(other)}
-        case _:
-            terms = set()
-    return {term for term in terms if term.startswith("?")}
 
 
 def compared(one: Range, sign: str, other: Range, must: bool) -> bool:

@@ -194,9 +194,7 @@ def flat_first(problem: Problem, limits: Limits, deadline: float | None) -> Outc
     """
     from confab.planner.grounded.best_first import plan_level
 
-    left = None if deadline is None else max(deadline - perf_counter(), 0.0)
-    within = Limits(limits.expansions, left)
-    return plan_level(problem, None, None, problem.goal_on(problem.domain.levels[0]), within, FLAT, FLAT_ROWS)
+    return plan_level(problem, limits=limits.until(deadline), most_work=FLAT, most_rows=FLAT_ROWS)
 
 
 def lowest_alone(call: Call, limits: Limits, most_work: float) -> Outcome:
@@ -213,8 +211,7 @@ def lowest_alone(call: Call, limits: Limits, most_work: float) -> Outcome:
     rests = {Symbol(cell[0], arguments_of(cell[1])): value for cell, value in restless.items()}
     goal = problem.goal_on(lowest)
     for wanted in (goal, {**rests, **goal}):
-        left = None if deadline is None else max(deadline - perf_counter(), 0.0)
-        flat = plan_level(problem, lowest, None, wanted, Limits(limits.expansions, left), most_work)
+        flat = plan_level(problem, lowest, None, wanted, limits.until(deadline), most_work)
         call.count(flat)
         if not rests or flat.plan is None or not validate(problem, flat.plan):
             break

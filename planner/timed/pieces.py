@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from confab.planner.checked_amounts import worth
-from confab.planner.checked_conditions import Arguments, ConditionReader, variables_of
+from confab.planner.checked_conditions import Arguments, ConditionReader, variables
 from confab.planner.validation import BehaviorReader, Facts
 from confab.reasoner.symbols import (
     AmountEffect,
@@ -79,7 +79,7 @@ def pieces_of(problem: Problem, behavior: Behavior) -> Pieces:
 
 def _fixed(behavior: Behavior) -> tuple[Parameter, ...]:
     """Return the variables that the preconditions of a behaviour determine."""
-    named = set[str]().union(*map(variables_of, behavior.preconditions))
+    named = set[str]().union(*map(variables, behavior.preconditions))
     return tuple(variable for variable in behavior.variables if variable.name in named)
 
 

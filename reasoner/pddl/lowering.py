@@ -26,6 +26,7 @@ from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, bo
 from confab.reasoner.amounts import inside as parts
 from confab.reasoner.derivation import circular
 from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.language import is_variable, terms
 from confab.reasoner.pddl.absence import Kept
 from confab.reasoner.pddl.formulas import FALSE as NEVER
 from confab.reasoner.pddl.formulas import TRUE as ALWAYS
@@ -504,20 +505,7 @@ class Lowering:
 
 def named(condition: Condition) -> set[str]:
     """Return the variables in a condition, except variables in a nested `AnyOf` or `Witness`."""
-    match condition:
-        case ValueCondition(_, arguments, value):
-            terms = {*arguments, value}
-        case RelationCondition(_, arguments):
-            terms = set(arguments)
-        case ClassCondition(term):
-            terms = {term}
-        case EqualityCondition(left, right):
-            terms = {left, right}
-        case Comparison(left, _, right):
-            terms = {*terms_of(left), *terms_of(right)}
-        case Witness() | AnyOf():
-            terms = set()
-    return {term for term in terms if term.startswith("?")}
+    return set(filter(is_variable, terms(condition)))
 
 
 def _times(number: Number, times: int) -> Number:
