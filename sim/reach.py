@@ -27,11 +27,14 @@ from confab.sim.motion import Reacher, beyond
 from confab.sim.stages import MARGIN, Numbers, grip_stages, rises
 from confab.sim.urdf import Spheres, UrdfModel
 
-VERSION = "3"
+VERSION = "4"
 """Version of the computation of reach; the fingerprint of the inputs contains the version.
 
 A stored result of another version counts as outdated.
 """
+
+SPARE = 0.01
+"""Distance in metres by which an object may stand farther away than its place."""
 
 LAYERS = 3
 """Reach is computed for places on at most this number of movable bodies that stand on one another."""
@@ -164,7 +167,7 @@ def _why(reacher: Reacher, loaded: Reacher, place: Place, height: float, numbers
             worst = max(blocked, key=lambda one: (blocked[one], -float(gaps[one].max())))
             return f"{worst} is in the way {name}"
         left = valid & free
-    return "nothing"
+    return f"out of reach for an object that stands {SPARE * 100:.0f} cm farther away than its place"
 
 
 def _settings(embodiment: Embodiment) -> tuple[Numbers, Sequence[float]]:
@@ -248,8 +251,13 @@ def _reaches(reacher: Reacher, loaded: Reacher, place: Place, height: float, num
     """Return whether some posture passes all stages of a grasp at a height above the place.
 
     The lift to the setting `least_raised` must be free of collisions. The height `raised` must be within the joints' limits.
+    An object that stands `SPARE` farther away must be within reach, too.
     """
     grip = np.array(place.position) + np.array([0.0, 0.0, height])
+    away = grip - reacher.arm.shoulder
+    farther = grip_stages(grip + SPARE * away / np.linalg.norm(away), numbers)
+    if not np.all([reacher.solve(stage.poses)[1] for stage in farther], axis=0).any():
+        return False
     solved = [reacher.solve(stage.poses) for stage in grip_stages(grip, _lowest(numbers))]
     above = reacher.solve(grip_stages(grip, numbers)[-1].poses)[1]
     valid = np.all([above, *(ok for _, ok in solved)], axis=0)
