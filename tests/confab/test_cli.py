@@ -126,7 +126,7 @@ def test_a_demonstration_in_the_order_of_the_figure_is_learned_from_the_command_
         (["fetch", "file:///etc/hostname"], 2, "wanted the http or https address"),
     ],
 )
-def test_bad_input_is_one_clear_line_and_nothing_is_written(
+def test_bad_input_gives_one_clear_line_and_writes_no_file(
     tmp_path: Path, arguments: list[str], code: int, word: str
 ) -> None:
     (tmp_path / "broken.ttl").write_text("@prefix : <x")

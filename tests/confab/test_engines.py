@@ -43,7 +43,7 @@ def no_engine_but_the_stand_in(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(engines, "answer", stand_in)
 
 
-def test_an_engines_plan_stands_under_the_levels_above_and_is_valid() -> None:
+def test_the_plan_of_an_engine_is_grouped_under_the_upper_levels_and_is_valid() -> None:
     problem = confab.load(SCENE).problem
     outcome = plan_by_engine(problem, "stand-in")
     assert outcome.status is Status.SOLVED and outcome.engine == "stand-in" and outcome.plan is not None
@@ -95,7 +95,7 @@ def test_an_installed_engine_runs_if_the_own_search_gives_up(monkeypatch: pytest
     for seconds, when in ((60, "then"), (None, "before")):
         outcome = scene.plan(time_limit=seconds).outcome
         assert outcome.status is Status.GAVE_UP
-        assert outcome.reason == Reason(f"the limit came first; an installed engine was asked {when}: e: timeout")
+        assert outcome.reason == Reason(f"the limit came first; an installed engine was tried {when}: e: timeout")
 
 
 def test_without_a_time_limit_an_engine_runs_after_bounded_work_and_own_search_continues_if_it_fails(

@@ -26,7 +26,7 @@ def explanation(memory: confab.Memory) -> Explanation:
     return explain(confab.load("beverage-serving").problem, memory, STEPS, 0, AGAINST)
 
 
-def test_the_weights_add_up_to_the_lead(explanation: Explanation) -> None:
+def test_the_weights_of_the_reasons_add_up_to_the_lead_over_the_alternative(explanation: Explanation) -> None:
     assert sum(why.weight for why in explanation.reasons) == pytest.approx(explanation.lead)
 
 

@@ -110,7 +110,7 @@ def test_the_page_of_a_failed_run_shows_the_failure_and_the_measurements(pages: 
     assert [bar["tone"] for row in data["rows"] if row["group"] == "actors" for bar in row["bars"]].count("failed") == 1
 
 
-def test_every_kind_of_run_says_how_it_ended(pages: dict[str, PageData]) -> None:
+def test_the_page_of_every_kind_of_run_shows_its_result(pages: dict[str, PageData]) -> None:
     assert (pages["plan"]["good"], pages["plan"]["status"]) == (True, "a plan, checked")
     assert (pages["towers-small"]["good"], pages["towers-small"]["status"]) == (None, "not planned yet")
     assert (pages["episode"]["good"], pages["episode"]["status"]) == (True, "reached")
@@ -155,7 +155,7 @@ def test_the_map_has_furniture_connections_or_order(pages: dict[str, PageData], 
 
 
 @pytest.mark.parametrize("name", ["beverage-serving", "two-tables", "kitchen-corner"])
-def test_the_map_is_seen_from_where_the_film_is_taken(name: str) -> None:
+def test_the_map_has_the_view_direction_of_the_film(name: str) -> None:
     scene = shipped(name)
     ground = ground_of(scene.problem, scene.embodiment)
     assert ground is not None
@@ -188,7 +188,7 @@ def test_a_scene_without_geometry_is_mapped_by_the_shapes_that_it_states() -> No
     assert len(spots) == 20
 
 
-def test_a_polygon_alone_is_a_place_too_and_other_shapes_are_left_out() -> None:
+def test_points_and_polygons_are_mapped_as_places_and_other_shapes_are_left_out() -> None:
     shapes = [("den", "POLYGON ((0 0, 4 0, 4 2, 0 2))"), ("hall", "LINESTRING (0 0, 1 1)"), ("door", "point(.5 1e0)")]
     ground = ground_of(shipped("rooms-waste").problem, None, shapes)
     assert ground is not None
@@ -308,7 +308,7 @@ def test_notebooks_show_values_without_a_script(
     assert isinstance(Memory.of(scene).advice(), Table)
 
 
-def test_without_anywidget_a_sentence_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_message_without_anywidget_names_the_package_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "anywidget", None)
     with pytest.raises(confab.KnowledgeError, match=r"needs anywidget.*pip install anywidget"):
         shipped("two-cups").board()

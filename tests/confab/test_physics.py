@@ -82,7 +82,7 @@ def test_effects_without_a_perceiver_are_counted_as_taken_on_trust(scene: confab
     assert told.endswith("; on trust, since no perceiver reads the effects: 1 of GREETED")
 
 
-def test_nothing_is_cut_off_in_a_pipe_and_lines_wrap_in_a_terminal(
+def test_lines_are_complete_in_a_pipe_and_wrap_in_a_terminal(
     report: Report, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path, told = report.plan.primitives[0].path, "goal in collision: " + "tray1, jar1 " * 20 + "(clearance_m -0.0034)"

@@ -15,8 +15,8 @@ from confab.reasoner.validation.validate import validate
 
 TWICE = "cup1 and cup2 have the same LOCATION, location1; state another LOCATION of one of the two"
 HELD = "<left_hand, HOLDS> is cup1, but <cup1, LOCATION> is location2, and left_hand isn't at location2"
-NOBODY = "<cup1, LOCATION> is in_hand, but no Hand has cup1 as its HOLDS"
-WRONG = [("cup1 LOCATION location1", TWICE), ("left_hand HOLDS cup1", HELD), ("cup1 LOCATION in_hand", NOBODY)]
+NOT_HELD = "<cup1, LOCATION> is in_hand, but no Hand has cup1 as its HOLDS"
+WRONG = [("cup1 LOCATION location1", TWICE), ("left_hand HOLDS cup1", HELD), ("cup1 LOCATION in_hand", NOT_HELD)]
 
 SCENE = """
 @prefix : <https://example.org/{name}#> .
@@ -67,7 +67,7 @@ def test_validation_of_a_file_reports_an_impossible_fact_in_the_same_words(tmp_p
     for name, place, more, message in (
         ("twice", "location1", "", TWICE),
         ("held", "location2", "r:left_hand k:holds :cup1 .", HELD),
-        ("nobody", "location2", "", NOBODY),
+        ("not_held", "location2", "", NOT_HELD),
     ):
         text = SCENE.format(name=name, place=place) + more
         text = text.replace("t:location2", "k:in_hand") if name == "nobody" else text

@@ -24,7 +24,7 @@ def scene() -> confab.Scene:
     return confab.load("beverage-serving")
 
 
-def test_an_episode_comes_back_as_it_was_saved(scene: confab.Scene, tmp_path: Path) -> None:
+def test_a_saved_episode_is_read_back_unchanged(scene: confab.Scene, tmp_path: Path) -> None:
     done = scene.execute(interventions=PEOPLE)
     again = scene.read_episode(done.save(tmp_path / "episode.json"))
     assert again.json() == done.json()
@@ -35,7 +35,7 @@ def test_an_episode_comes_back_as_it_was_saved(scene: confab.Scene, tmp_path: Pa
     assert scene.execute(interventions=PEOPLE).save(tmp_path / "episode.json").is_file()
 
 
-def test_verdicts_come_back_as_they_were_saved(scene: confab.Scene, tmp_path: Path) -> None:
+def test_saved_verdicts_are_read_back_unchanged(scene: confab.Scene, tmp_path: Path) -> None:
     plan = scene.plan()
     steps = [StepReport(step, Verdict(True, measured={"lag": 0.5}), 1.0) for step in plan.plan.primitives]
     lost = Verdict(False, "slip or drop", ("cup2",), {"lag": 0.0863}, "it was lost")

@@ -71,7 +71,7 @@ def test_preconditions_of_a_level_are_translated_into_the_terms_of_the_lower_lev
     assert ClassCondition("?object", "Cup", negated=True) in guard.alternatives[0][0].alternatives[1]  # type: ignore[union-attr]
 
 
-def test_values_between_those_of_the_upper_level_are_free() -> None:
+def test_values_that_the_upper_level_does_not_see_get_no_additional_preconditions() -> None:
     problem = tabletop()
     assert binding(problem, 2).behaviors["B2_PICK"] == problem.domain.behaviors["B2_PICK"]
 

@@ -151,7 +151,7 @@ def test_a_price_in_turtle_leads_to_the_cheapest_plan_and_is_printed(tmp_path: P
     assert confab.load(path).plan(mode="paper").outcome.cost == 8.0
 
 
-def test_a_cost_beside_a_price_is_refused(tmp_path: Path) -> None:
+def test_a_behaviour_with_a_cost_and_a_price_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "van.ttl"
     path.write_text(DELIVERY.replace("c:price :DRIVE.fare", "c:price :DRIVE.fare ; c:cost 1.0"))
     with pytest.raises(confab.KnowledgeError, match="DRIVE> has a c:cost and a c:price; keep one of them"):

@@ -41,7 +41,7 @@ def names(problem: Problem, leave_levels: bool = True) -> list[str]:
     return [step.behavior for step in found.primitives]
 
 
-def test_a_chest_is_locked_once_where_a_plan_that_keeps_the_levels_would_be_half_as_long_again() -> None:
+def test_a_plan_leaves_a_level_if_a_plan_that_keeps_it_would_be_much_longer() -> None:
     assert names(chest(4)) == ["UNLOCK", "OPEN", *["TAKE"] * 4, "SHUT", "LOCK"]
     assert len(names(chest(4), leave_levels=False)) == 20
 

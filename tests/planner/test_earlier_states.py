@@ -75,7 +75,7 @@ def without_added_parts(problem: Problem) -> Problem:
 
 
 @pytest.mark.parametrize("mode", ["guarded", "paper", "optimal"])
-def test_the_bridge_is_crossed_once_tickets_come_before_the_museum_and_all_sights_are_seen(
+def test_the_plan_keeps_at_most_once_and_only_after_and_achieves_all_remembered_goals(
     mode: Literal["guarded", "paper", "optimal"],
 ) -> None:
     plan = confab.load("tour-small").plan(mode=mode).plan

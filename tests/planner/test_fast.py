@@ -279,7 +279,7 @@ def test_a_search_with_an_upper_bound_finds_the_same_shortest_plans() -> None:
     assert compared > 10
 
 
-def test_the_time_limit_holds_where_the_lowest_level_alone_is_planned() -> None:
+def test_the_time_limit_also_holds_if_only_the_lowest_level_is_planned() -> None:
     problem = family("swap", 50)
     level = problem.domain.levels[-1]
     only = {behavior.name: behavior for behavior in problem.domain.at_level(level)}

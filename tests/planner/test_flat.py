@@ -207,7 +207,7 @@ def carrier(parcels: int) -> Problem:
     return imported(parse(domain, text)).problem
 
 
-def test_windows_make_a_plan_shorter_and_it_still_leads_to_the_goal() -> None:
+def test_windows_shorten_a_plan_that_still_achieves_the_goal() -> None:
     task = ground(carrier(6))
     assert isinstance(task, Task)
     number = {task.describe(operator)[:2]: operator for operator in range(len(task))}

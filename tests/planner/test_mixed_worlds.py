@@ -75,7 +75,7 @@ def test_the_plain_interpreter_rejects_an_incomplete_plan_and_an_unknown_step() 
 
 
 @pytest.fixture
-def patiently(monkeypatch: pytest.MonkeyPatch) -> None:
+def unlimited_judge(monkeypatch: pytest.MonkeyPatch) -> None:
     """Give each call a minute of wall-clock time; its CPU time stays limited."""
     monkeypatch.setattr(judging, "SECONDS", 60.0)
 
@@ -91,7 +91,7 @@ def test_small_worlds_with_all_constructs_give_no_wrong_answer(first: int, tmp_p
     assert not wrong
 
 
-@pytest.mark.usefixtures("patiently")
+@pytest.mark.usefixtures("unlimited_judge")
 @pytest.mark.parametrize("seed", [95_006_284, 95_012_744, 95_017_985])
 def test_no_mode_refuses_a_division_by_an_amount_that_changes(seed: int, tmp_path: Path) -> None:
     """A task that can't be grounded because of a division is solved, proved unsolvable or given up by other methods."""
@@ -100,7 +100,7 @@ def test_no_mode_refuses_a_division_by_an_amount_that_changes(seed: int, tmp_pat
     assert {its.status[mode] for mode in ("guarded", "optimal", "paper")} <= {"solved", "unsolvable"}
 
 
-@pytest.mark.usefixtures("patiently")
+@pytest.mark.usefixtures("unlimited_judge")
 @pytest.mark.parametrize("seed", [200_002_806, 200_004_245])
 def test_a_world_with_few_states_is_certified_by_its_states(seed: int, tmp_path: Path) -> None:
     its = Judge(mixed(seed, 0.0), tmp_path, every=True).judged()
@@ -128,7 +128,7 @@ def test_no_strict_level_is_left_to_bring_initial_values_to_rest(seed: int, tmp_
     assert not Judge(mixed(seed, 0.0), tmp_path, every=True).judged().complaints
 
 
-@pytest.mark.usefixtures("patiently")
+@pytest.mark.usefixtures("unlimited_judge")
 def test_a_count_follows_values_that_a_witness_loses(tmp_path: Path) -> None:
     """An effect on all members of a class removes values that a condition of the count requires; every mode accepts this world."""
     its = Judge(mixed(301_000_072, 0.0), tmp_path, every=True).judged()
@@ -209,7 +209,7 @@ def test_failing_conditions_without_common_variables_are_tested_one_by_one(
     assert calls[0] < 10_000
 
 
-@pytest.mark.usefixtures("patiently")
+@pytest.mark.usefixtures("unlimited_judge")
 def test_a_total_of_totals_is_kept_by_the_change_of_each(tmp_path: Path) -> None:
     """A sum of sums that many effects change at the same time is accepted: the changes are added up one by one."""
     its = Judge(mixed(371_000_305), tmp_path, every=True).judged()

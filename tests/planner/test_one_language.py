@@ -110,7 +110,7 @@ EVALUATORS: dict[str, Callable[[Problem], After]] = {
 """All evaluators of behaviours except the naive interpreter, which is the reference."""
 
 
-def otherwise(problem: Problem) -> set[str]:
+def deviating(problem: Problem) -> set[str]:
     """Return the evaluators whose result differs from that of the naive interpreter."""
     now, truth = facts(problem.initial), by_naive(problem)
     changing = {done: after for done, after in truth.items() if after != now}
@@ -123,7 +123,7 @@ def otherwise(problem: Problem) -> set[str]:
 @given(seed=st.integers(0, 10**9))
 @settings(max_examples=settings().max_examples * 3)
 def test_all_evaluators_agree_on_applicable_behaviours_and_their_effects(seed: int) -> None:
-    assert otherwise(language(seed, defined=seed % 2 == 1)) == set()
+    assert deviating(language(seed, defined=seed % 2 == 1)) == set()
 
 
 @pytest.fixture
@@ -141,7 +141,7 @@ def true_first(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_wrong_order_of_effects_is_detected() -> None:
     noticed, seed = set[str](), 0
     while len(noticed) < 3 and seed < 200:
-        noticed |= otherwise(language(seed))
+        noticed |= deviating(language(seed))
         seed += 1
     assert noticed == {"paper", "operators", "task"}
 
@@ -179,7 +179,7 @@ CASES = {
 """The function of each evaluator that has a case for every kind of condition."""
 
 
-def forgotten(source: str, function: str, kinds: set[str]) -> set[str]:
+def unhandled(source: str, function: str, kinds: set[str]) -> set[str]:
     """Return the kinds of conditions for which a function has no case."""
     found = set()
     for node in ast.walk(ast.parse(source)):
@@ -193,8 +193,8 @@ def test_every_evaluator_handles_every_kind_of_condition(path: str, function: st
     kinds = set(re.findall(r"\w+", str(vars(symbols)["Condition"])))
     source = (ROOT / path).read_text(encoding="utf-8")
     assert len(kinds) >= 6
-    assert forgotten(source, function, kinds) == set()
-    assert forgotten(source, function, {*kinds, "DerivedCondition"}) == {"DerivedCondition"}
+    assert unhandled(source, function, kinds) == set()
+    assert unhandled(source, function, {*kinds, "DerivedCondition"}) == {"DerivedCondition"}
 
 
 def test_random_behaviours_are_of_every_kind() -> None:

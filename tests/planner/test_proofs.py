@@ -35,12 +35,12 @@ from worlds.agreement import solvable
 from worlds.hierarchies import hierarchy
 from worlds.writing import becomes, behavior, has, lacks, world
 
-NOBODY = Witness("?x", "Cup", (has("AT", "?x", "?p"),), negated=True)
-OTHER = EqualityCondition("?o", "?p", True)
+PLACE_IS_FREE = Witness("?x", "Cup", (has("AT", "?x", "?p"),), negated=True)
+ANOTHER_PLACE = EqualityCondition("?o", "?p", True)
 REACH = RelationCondition("canReach", ("?h", "?p"))
 REACHED = [("left", "shelf"), ("left", "table"), ("right", "table"), ("right", "sink")]
 PUT = behavior(
-    "PUT", 1, "?h:Hand ?c:Cup ?p:Place", [REACH, has("AT", "?c", "?o"), OTHER, NOBODY], [becomes("AT", "?c", "?p")], "?o:Place"
+    "PUT", 1, "?h:Hand ?c:Cup ?p:Place", [REACH, has("AT", "?c", "?o"), ANOTHER_PLACE, PLACE_IS_FREE], [becomes("AT", "?c", "?p")], "?o:Place"
 )  # fmt: skip
 WASH = behavior(
     "WASH", 1, "?c:Cup", [has("AT", "?c", "sink"), has("CLEAN", "?c", FALSE)], [becomes("CLEAN", "?c", TRUE)]
@@ -173,17 +173,19 @@ def test_two_goals_that_exclude_each_other_are_named() -> None:
     assert not solvable(kitchen(both))
 
 
-HEAP = replace(PUT, preconditions=tuple(c for c in PUT.preconditions if c is not NOBODY))
-OF_TRAYS = replace(PUT, preconditions=(*HEAP.preconditions, replace(NOBODY, kind="Tray")))
-SOMEBODY = replace(PUT, preconditions=(*HEAP.preconditions, replace(NOBODY, negated=False)))
-ELSEWHERE = replace(
-    PUT, preconditions=(*HEAP.preconditions, Witness("?x", "Cup", (has("AT", "?x", "?o"), OTHER), True))
+HEAP = replace(PUT, preconditions=tuple(c for c in PUT.preconditions if c is not PLACE_IS_FREE))
+NO_TRAYS = replace(PUT, preconditions=(*HEAP.preconditions, replace(PLACE_IS_FREE, kind="Tray")))
+PLACE_IS_OCCUPIED = replace(PUT, preconditions=(*HEAP.preconditions, replace(PLACE_IS_FREE, negated=False)))
+OLD_PLACE_IS_FREE = replace(
+    PUT, preconditions=(*HEAP.preconditions, Witness("?x", "Cup", (has("AT", "?x", "?o"), ANOTHER_PLACE), True))
 )
 DROP = behavior("DROP", 1, "?c:Cup", [], [becomes("AT", "?c", "sink")])
-TWO = behavior("TWO", 1, "?c:Cup ?d:Cup ?p:Place", [NOBODY], [becomes("AT", "?c", "?p"), becomes("AT", "?d", "?p")])
+TWO = behavior(
+    "TWO", 1, "?c:Cup ?d:Cup ?p:Place", [PLACE_IS_FREE], [becomes("AT", "?c", "?p"), becomes("AT", "?d", "?p")]
+)
 
 
-@pytest.mark.parametrize("more", [HEAP, OF_TRAYS, SOMEBODY, ELSEWHERE, DROP, TWO])
+@pytest.mark.parametrize("more", [HEAP, NO_TRAYS, PLACE_IS_OCCUPIED, OLD_PLACE_IS_FREE, DROP, TWO])
 def test_goals_exclude_each_other_only_if_every_achiever_requires_a_free_place(more: Behavior) -> None:
     both = {"AT cup1": "sink", "AT cup2": "sink"}
     problem = kitchen(both, behaviors=[PUT, replace(more, name="MORE")])
@@ -193,8 +195,8 @@ def test_goals_exclude_each_other_only_if_every_achiever_requires_a_free_place(m
 
 
 def test_a_condition_that_no_object_of_a_wider_class_is_there_is_strong_enough() -> None:
-    anybody = replace(PUT, preconditions=(*HEAP.preconditions, replace(NOBODY, kind="Thing")))
-    problem = kitchen({"AT cup1": "sink", "AT cup2": "sink"}, behaviors=[anybody])
+    wider = replace(PUT, preconditions=(*HEAP.preconditions, replace(PLACE_IS_FREE, kind="Thing")))
+    problem = kitchen({"AT cup1": "sink", "AT cup2": "sink"}, behaviors=[wider])
     assert "exclude" in why(replace(problem, classes={**problem.classes, "Thing": ("cup1", "cup2", "tray")}))
 
 
@@ -427,7 +429,7 @@ FOUND = [16, 14]
 """Numbers of unsolvable worlds among forty random worlds."""
 
 
-def so_many(many: int, of: str, kind: str = "Cup") -> Witness:
+def number_of(many: int, of: str, kind: str = "Cup") -> Witness:
     """Return the condition that `many` different cups have a property."""
     condition: Witness | None = None
     names = [f"?c{number}" for number in range(many)]
@@ -446,15 +448,15 @@ NO_ATTIC = "PUT requires a Hand that canReach attic, and there is none; so cup1 
 @pytest.mark.parametrize(
     ("rule", "why_not"),
     [
-        ((so_many(2, "DRY"),), "PAIR requires two Cup, each DRY true; there can be only one"),
-        ((so_many(3, "DRY"),), "PAIR requires three Cup, each DRY true; there can be only one"),
-        ((so_many(5, "CLEAN"),), "PAIR requires five Cup, each CLEAN true; there can be only three"),
+        ((number_of(2, "DRY"),), "PAIR requires two Cup, each DRY true; there can be only one"),
+        ((number_of(3, "DRY"),), "PAIR requires three Cup, each DRY true; there can be only one"),
+        ((number_of(5, "CLEAN"),), "PAIR requires five Cup, each CLEAN true; there can be only three"),
         (
-            (has("CLEAN", "cup1", TRUE), so_many(2, "DRY")),
+            (has("CLEAN", "cup1", TRUE), number_of(2, "DRY")),
             "PAIR requires two Cup, each DRY true; there can be only one",
         ),
         ((ATTIC,), NO_ATTIC),
-        ((so_many(2, "CLEAN"), ATTIC), NO_ATTIC),
+        ((number_of(2, "CLEAN"), ATTIC), NO_ATTIC),
     ],
 )
 def test_the_reason_on_a_counting_rule_states_the_possible_number_and_no_internal_names(

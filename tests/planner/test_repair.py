@@ -178,7 +178,7 @@ def test_a_repair_ends_at_its_time_limit() -> None:
     )
 
 
-def test_repair_and_planning_anew_have_one_limit_of_time(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_repair_and_replanning_share_one_time_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     now = replace(serving(), initial={**serving().initial, location("cup1"): "location7"})
     left: list[float | None] = []
 
@@ -186,10 +186,10 @@ def test_repair_and_planning_anew_have_one_limit_of_time(monkeypatch: pytest.Mon
         left.append(limits.seconds)
         return plan(problem, limits=limits)
 
-    def in_vain(*_: object) -> None:
+    def failing_repair(*_: object) -> None:
         sleep(0.05)
 
-    monkeypatch.setattr("confab.planner.acting.repair.repair", in_vain)
+    monkeypatch.setattr("confab.planner.acting.repair.repair", failing_repair)
     repaired = repair_or_replan(now, planned().steps, serving(), planner, using(), limits=Limits(seconds=60.0))
     assert repaired.kind == "replan"
     assert repaired.steps is not None
@@ -268,7 +268,7 @@ def test_undone_steps_are_repeated_first_and_the_planned_steps_are_kept() -> Non
     assert {s.arguments[0] for s in repaired.steps[: len(moved)]} == {symbol.arguments[0] for symbol in moved}
 
 
-def after_somebody(problem: Problem, draw: random.Random) -> Problem:
+def after_interventions(problem: Problem, draw: random.Random) -> Problem:
     """Return a situation in which a person has moved an object, or has changed, added or dropped a goal."""
     stands = {s: v for s, v in problem.initial.items() if s.situation == "LOCATION" and v != "in_hand"}
     free = sorted({*problem.classes["Location"]} - {*stands.values(), *problem.goal.values(), "in_hand"})
@@ -314,7 +314,7 @@ def test_repairs_after_random_interruptions_change_few_steps(
         draw = random.Random(seed)
         done = draw.randrange(len(trial.plan.primitives))
         rest, before = rest_after(trial.plan, done), replace(problem, initial=trial.states[done])
-        now = after_somebody(before, draw)
+        now = after_interventions(before, draw)
 
         def planner(there: Problem, /, *, limits: Limits) -> Outcome:
             anew.append(there)

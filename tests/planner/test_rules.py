@@ -365,7 +365,7 @@ def test_a_lesson_teaches_refinements_where_steps_of_its_own_plan_are_refined_to
     assert "L2_SHUT" in {rule.does[0] for rule in rules_in(experience)}
 
 
-def test_rules_lead_refinements_where_most_of_the_effort_is() -> None:
+def test_rules_are_followed_in_refinements_with_most_of_the_search_effort() -> None:
     small, large = (confab.load(f"canal-{size}").problem for size in ("small", "large"))
     experience = Experience("robot")
     teach(experience, small)

@@ -24,13 +24,13 @@ CASES = [("served", family("served", 6)), ("full", family("full", 6)), ("handove
 CASES += [(f"random {seed}", random_table(seed)) for seed in range(50_000, 50_006)] + [("rooms", rooms(6, 1))]
 
 
-def ask_anew(wants: Subgoals, monkeypatch: pytest.MonkeyPatch) -> None:
+def disable_cache(subgoals: Subgoals, monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the cache keep no results."""
 
     def would_hold(achiever: Achiever, condition: Condition, env: Env, term: str, value: str) -> bool:
-        return wants.holds(achiever, condition, {**env, term: value})
+        return subgoals.holds(achiever, condition, {**env, term: value})
 
-    monkeypatch.setattr(wants, "_would_hold", would_hold)
+    monkeypatch.setattr(subgoals, "_would_hold", would_hold)
 
 
 @pytest.mark.parametrize(("name", "problem"), CASES, ids=[name for name, _ in CASES])
@@ -42,7 +42,7 @@ def test_cached_subgoals_are_those_of_the_present_state(
     program = Program(problem)
     for level in problem.domain.levels:
         kept, fresh = (Call(problem, Compiled(program), None, 100_000) for _ in range(2))
-        ask_anew(fresh.space.subgoals, monkeypatch)
+        disable_cache(fresh.space.subgoals, monkeypatch)
         for _ in range(12):
             for (at, situation), achievers in program.achievers.items():
                 cells = [cell for cell in kept.goal.items() if cell[0][0] == situation]

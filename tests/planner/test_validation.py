@@ -73,7 +73,7 @@ def refined(step: Step, *names: str) -> Step:
     return replace(step, steps=tuple(below for below in step.steps if below.behavior in names))
 
 
-def test_a_door_that_is_left_open_is_found() -> None:
+def test_a_door_that_a_plan_leaves_open_is_detected() -> None:
     (fetch,) = solved(fire_door())
     open_ = refined(fetch, "OPEN", "TAKE", "GO", "PUT")
     assert "touches <door, DOOR> and leaves it open; at rest it is shut" in faults(fire_door().problem, (open_,))
@@ -106,7 +106,7 @@ def test_the_next_step_begins_where_the_refinement_of_the_one_before_ended() -> 
     assert "preconditions don't hold" in faults(case.problem, again)  # the van has left the depot
 
 
-def test_a_step_without_refinement_among_refined_ones_is_found() -> None:
+def test_a_step_without_refinement_among_refined_steps_is_detected() -> None:
     first, *others = solved(van())
     assert "it has no refinement, but other steps have one" in faults(
         van().problem, (replace(first, steps=()), *others)

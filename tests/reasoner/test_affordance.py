@@ -39,7 +39,7 @@ def test_a_cup_affords_pouring_if_a_drink_is_wanted() -> None:
     assert ("cup1", "POUR", "bottle1", "cup1") not in afforded("living-room", anna__WISH="juice", cup1__CONTENT="juice")
 
 
-def test_the_living_room_cup_goes_to_the_kitchen_unless_a_drink_was_asked_for() -> None:
+def test_a_cup_in_the_living_room_affords_clearing_away_unless_a_drink_is_wanted() -> None:
     cleared = ("cup1", "CLEAR_AWAY", "cup1", "counter_right")
     assert cleared in afforded("living-room")
     assert cleared not in afforded("living-room", anna__WISH="juice")
@@ -54,7 +54,7 @@ def test_bread_on_the_floor_does_not_afford_eating() -> None:
     assert ("bread2", "EAT", "bread2") not in afforded("living-room", bread2__REST_OF_FOOD="eaten")
 
 
-def test_owl_inference_says_which_places_are_in_the_living_room() -> None:
+def test_owl_inference_finds_the_places_in_the_living_room() -> None:
     graph, reading = scene("living-room")
     assert reading.problem.classes["LivingRoomPlace"] == ("floor", "table_left", "table_right")
     graph = load("living-room")

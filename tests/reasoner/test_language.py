@@ -22,9 +22,7 @@ from worlds.writing import has, lacks
 AT, NOT_AT = has("AT", "?c", "?p"), lacks("AT", "?c", "?p")
 NEAR, KIND, SAME = RelationCondition("near", ("?p", "door")), ClassCondition("?c", "Cup"), EqualityCondition("?c", "?d")
 FULL = Comparison(Calculation("+", Amount("FILL", ("?c",)), Fraction(1)), "<", Measure("size", ("?c", "?d")))
-LOOKED_FOR = Witness(
-    "?o", "Cup", (has("AT", "?o", "?p"), has("IN", "?p", "?room"), lacks("AT", "?o", "?q")), negated=True
-)
+WITNESS = Witness("?o", "Cup", (has("AT", "?o", "?p"), has("IN", "?p", "?room"), lacks("AT", "?o", "?q")), negated=True)
 EITHER = AnyOf(((has("AT", "?c", "?p"), NEAR), (KIND, SAME)))
 
 
@@ -40,10 +38,10 @@ EITHER = AnyOf(((has("AT", "?c", "?p"), NEAR), (KIND, SAME)))
         (FULL, ("?c", "?c", "?d"), {"?c", "?d"}, {"?c", "?d"}),
         # The condition determines ?p, and with ?p also ?room; but the individuals that aren't at ?q can't be determined without
         # ?q.
-        (LOOKED_FOR, (), {"?p", "?room", "?q"}, {"?q"}),
+        (WITNESS, (), {"?p", "?room", "?q"}, {"?q"}),
         (EITHER, (), {"?c", "?p", "?d"}, {"?c", "?d"}),
         (Witness("?o", "Cup", (NEAR,)), (), {"?p"}, {"?p"}),
-        (AnyOf(((LOOKED_FOR,), (NEAR,))), (), {"?p", "?room", "?q"}, {"?p", "?q"}),
+        (AnyOf(((WITNESS,), (NEAR,))), (), {"?p", "?room", "?q"}, {"?p", "?q"}),
     ],
 )
 def test_each_kind_of_condition_has_the_right_terms_mentions_and_needs(
@@ -60,10 +58,10 @@ def test_variables_begin_with_a_question_mark() -> None:
 
 def test_nested_conditions_are_walked_group_by_group_after_their_parent() -> None:
     assert [groups(c) for c in (AT, NEAR, KIND, SAME, FULL)] == [()] * 5
-    assert groups(LOOKED_FOR) == (LOOKED_FOR.conditions,)
+    assert groups(WITNESS) == (WITNESS.conditions,)
     assert groups(EITHER) == EITHER.alternatives
-    nested = AnyOf(((LOOKED_FOR, KIND), (SAME,)))
-    assert list(walk(nested)) == [nested, LOOKED_FOR, *LOOKED_FOR.conditions, KIND, SAME]
+    nested = AnyOf(((WITNESS, KIND), (SAME,)))
+    assert list(walk(nested)) == [nested, WITNESS, *WITNESS.conditions, KIND, SAME]
 
 
 def test_numeric_relations_are_found_in_all_parts_of_behaviours() -> None:

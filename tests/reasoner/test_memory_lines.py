@@ -245,7 +245,7 @@ def test_a_missing_or_binary_memory_file_is_a_clear_error(tmp_path: Path) -> Non
         load(tmp_path / "m.ttl")
 
 
-def test_a_deleted_rule_takes_its_counts_with_it_and_nothing_else() -> None:
+def test_a_deleted_rule_removes_only_its_own_counts() -> None:
     kept = rule(ClassCondition("?cup", "Cup"))
     text = written(rule(), kept)
     text = "".join(line for line in text.splitlines(True) if not line.startswith(f"m:{rule().name}"))

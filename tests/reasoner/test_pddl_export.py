@@ -135,9 +135,9 @@ def problem_of(
 
 
 THING, OTHER, PLACE = Parameter("?x", "Thing"), Parameter("?y", "Thing"), Parameter("?p", "Place")
-NOBODY = Witness("?z", "Thing", (at("?z", "?p"),), negated=True)
+PLACE_IS_FREE = Witness("?z", "Thing", (at("?z", "?p"),), negated=True)
 LIGHT = ValueEffect("LIT", ("?x",), TRUE)
-MOVE = Behavior("MOVE", 1, (THING, PLACE), (), (NOBODY,), (ValueEffect("AT", ("?x",), "?p"),))
+MOVE = Behavior("MOVE", 1, (THING, PLACE), (), (PLACE_IS_FREE,), (ValueEffect("AT", ("?x",), "?p"),))
 JUMP = Behavior("JUMP", 1, (THING, PLACE), (), (), (ValueEffect("AT", ("?x",), "?p"),))
 SWAP = Behavior(
     "SWAP",
@@ -156,7 +156,7 @@ SWAP = Behavior(
         ([JUMP], 2.0),
         ([SWAP], 1.0),
         ([MOVE, JUMP], 2.0),  # two objects may be at one place, so the predicate "free" isn't maintained by itself
-        ([replace(MOVE, preconditions=(NOBODY, at("?x", "?p", negated=True)))], 3.0),
+        ([replace(MOVE, preconditions=(PLACE_IS_FREE, at("?x", "?p", negated=True)))], 3.0),
         # the later effect takes precedence
         ([replace(JUMP, effects=(*JUMP.effects, ValueEffect("AT", ("b",), "m")))], 1.0),
         ([replace(JUMP, effects=(ValueEffect("AT", ("b",), "m"), *JUMP.effects))], 1.0),

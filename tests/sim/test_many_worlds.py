@@ -26,14 +26,14 @@ def used() -> int:
 
 
 def test_closed_worlds_free_their_memory_and_leave_no_files(serving: Case) -> None:
-    def come_and_go(times: int) -> None:
+    def open_and_close(times: int) -> None:
         for _ in range(times):
             with PhysicsWorld(serving.embodiment, serving.initial, 0):
                 pass
 
-    come_and_go(3)
+    open_and_close(3)
     before = used()
-    come_and_go(10)
+    open_and_close(10)
     assert used() - before < 200_000  # four vessels in each world; their meshes would take 2 MB
     assert not any(pybullet.isConnected(client) for client in range(64))
     assert not list(Path(tempfile.gettempdir()).glob(f"confab-bodies-{Path('/proc/self').resolve().name}-*"))

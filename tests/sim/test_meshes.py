@@ -19,7 +19,7 @@ FOLDER = pybullet_data()
         "kuka_iiwa/meshes/link_4.stl",
     ],
 )
-def test_every_point_of_a_mesh_is_in_a_sphere_and_no_sphere_stands_out_far(name: str) -> None:
+def test_spheres_cover_every_point_of_a_mesh_and_protrude_little(name: str) -> None:
     assert FOLDER is not None
     corners = triangles(FOLDER / name)
     centers, radii = cover(corners)

@@ -131,7 +131,7 @@ def test_free_postures_are_those_with_distances_above_the_margin(serving: Case) 
         assert 0 < found.sum() < len(q)
 
 
-def test_a_goal_in_collision_is_never_come_to(serving: Case) -> None:
+def test_a_goal_in_collision_is_never_reached(serving: Case) -> None:
     """A search that grew from this goal would end there, although the last step leads into the pillar."""
     blocked = reacher(serving.embodiment, pillar())
     beside = np.repeat(GOAL[None], 60, axis=0)

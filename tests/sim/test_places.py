@@ -106,7 +106,7 @@ def test_profile_points_of_equal_height_keep_the_order_of_their_indices(tmp_path
     assert shape.profile == ((0.0, 0.13), (0.012, 0.13), (0.012, 0.012), (0.18, 0.012))
 
 
-def test_a_place_on_a_body_that_is_out_of_reach_is_refuted_where_the_body_stands(tmp_path: Path) -> None:
+def test_an_unreachable_place_on_a_body_is_refuted_for_the_position_of_the_body(tmp_path: Path) -> None:
     one = scene("tray", tmp_path)
     steps = one.plan().plan.primitives
     taken = next(i for i, step in enumerate(steps) if step.arguments == ("left_hand", "tin1"))
