@@ -68,6 +68,6 @@ def _following(problem: Problem, situations: Collection[str]) -> Iterator[Symbol
         for arguments in product(
             *(problem.classes.get(kind, ()) for kind in problem.domain.situations[name].arguments)
         ):
-            check(f"working out {name} in the initial state")
+            check(f"deriving {name} in the initial state")
             if table.now[name].get(key_of(arguments)) == TRUE:
                 yield Symbol(name, arguments)

@@ -22,8 +22,8 @@ MOST_SAID = 6
 """Maximum number of conditions in the sentence about a rule."""
 ASKED = (
     (re.compile(r"wanted (\S+) of (\S+)"), "the {0} wanted of {1}: {answer}"),
-    (re.compile(r"who has (\S+) as (\S+)"), "who has {0} as {1}: {answer}"),
-    (re.compile(r"who wants (\S+) as (\S+)"), "who shall have {0} as {1}: {answer}"),
+    (re.compile(r"who has (\S+) as (\S+)"), "object whose {1} is {0}: {answer}"),
+    (re.compile(r"who wants (\S+) as (\S+)"), "object whose {1} shall be {0}: {answer}"),
     (re.compile(r"who is (\S+) with (\S+)"), "{0} is {answer} beside {1}"),
     (re.compile(r"who is (\S+)"), "{0} is {answer}"),
     (re.compile(r"(\S+) is a (\S+)"), "{0} is a {1}: {answer}"),

@@ -300,7 +300,7 @@ class Memory(metaclass=RightNames):
     def _check_written(self, file: Path) -> None:
         """Raise `KnowledgeError` if the content of a file differs from this memory."""
         found = memory_lines(file)
-        read, links = parse(found, "what was written", self.names), load_links(file, self.names, found)
+        read, links = parse(found, "the written file", self.names), load_links(file, self.names, found)
         if read != self.experience or len(links) != len(self.links):
             raise KnowledgeError(
                 "the written file differs from the memory, so the old file is kept; please report this fault"

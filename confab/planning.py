@@ -236,7 +236,7 @@ def _plan(
         if theirs is None or outcome.status is not Status.GAVE_UP:
             return replace(outcome, seconds=perf_counter() - began)
         ours = outcome.reason.text if outcome.reason else "gave up"
-        reason = Reason(f"{ours}; an installed engine was asked {'before' if soon else 'then'}: {theirs}")
+        reason = Reason(f"{ours}; an installed engine was tried {'before' if soon else 'then'}: {theirs}")
         return replace(outcome, reason=reason, seconds=perf_counter() - began)
 
     def lasting(problem: Problem) -> Problem:

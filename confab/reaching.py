@@ -97,7 +97,7 @@ def with_reach(scene: S) -> S:
             save_reach(path, graph, names, reached.pairs, reached.inputs)
             log.info("wrote %s", path)
         except OSError as error:
-            log.warning("%s: %s; what was computed isn't kept", path, error.strerror)
+            log.warning("%s: %s; the computed reach facts aren't saved", path, error.strerror)
     return type(scene)(graph, scene.seconds)
 
 

@@ -56,4 +56,4 @@ def keep(scene: Known, refutations: Sequence[Refutation]) -> None:
         try:
             add_to_reach(file, scene.knowledge, triples)
         except (PermissionError, FileExistsError, KnowledgeError) as error:
-            log.warning("%s: %s; what was refuted isn't kept", file, error)
+            log.warning("%s: %s; the refutations aren't saved", file, error)

@@ -189,7 +189,7 @@ def _log(error: BaseException) -> str:
         with tempfile.NamedTemporaryFile("w", prefix="confab-", suffix=".log", delete=False, encoding="utf-8") as file:
             file.write(f"{sys.version}\n{sys.argv}\n{said}")
     except OSError as failure:
-        return f"what follows, since no log can be written ({failure.strerror}): {said.splitlines()[-3:]}"
+        return f"this traceback, since no log can be written ({failure.strerror}): {said.splitlines()[-3:]}"
     return file.name
 
 

@@ -207,7 +207,7 @@ def _xml(element: Element) -> ElementTree.Element:
         case "Set":
             return ElementTree.Element("Script", {"code": f"{element.name} := {element.ports['value']}"})
         case "Again":
-            return ElementTree.Element("Sleep", {"msec": "1", "name": "tick anew"})
+            return ElementTree.Element("Sleep", {"msec": "1", "name": "tick again"})
         case "Condition" | "Action":
             return ElementTree.Element(element.name, {"name": element.key, **element.ports})
         case kind:
@@ -290,7 +290,7 @@ def _python(element: Element, names: Mapping[str, str], depth: int) -> str:
         case "Set":
             return f"mark({element.name!r}, {element.ports['value'] == 'true'})"
         case "Again":
-            return 'Running("tick anew")'
+            return 'Running("tick again")'
         case "Condition" | "Action":
             ports = "".join(f", {port}={value!r}" for port, value in element.ports.items())
             return f"leaf({element.kind!r}, {element.name!r}, {element.key!r}{ports})"

@@ -106,7 +106,7 @@ def behavior_tree(problem: Problem, plan: Plan) -> Subtree:
     """
     tree = _Tree(problem, plan)
     goal = Holds((*(Fact(symbol, value) for symbol, value in sorted(problem.goal.items())), *tree.at_rest()))
-    marking = Subtree("what is done", All(tree.marks()))
+    marking = Subtree("completed steps", All(tree.marks()))
     return Subtree("plan", First((goal, All((marking, *tree.in_order(plan.steps), goal)))))
 
 

@@ -124,7 +124,7 @@ class Stratum:
             order += list(asked)[len(order) :]
 
     def _try(self, cell: Cell) -> bool:
-        check("working out what follows from rules")
+        check("deriving facts from rules")
         found = self.tests[cell[0]](*arguments_of(cell[1]))
         if found:
             self.known[cell] = True

@@ -88,7 +88,7 @@ def stage(engine: Engine, draft: Draft, perturb: Perturbation | None, beads: boo
     for robot, stand in draft.stands.items():
         if robot not in engine.bases or stand not in engine.embodiment.stands:
             raise ValueError(
-                f"'{robot}' is said to stand at '{stand}', but doesn't drive (e:drivingSpeed), or that is no e:Stand"
+                f"'{robot}' is stated to stand at '{stand}', but doesn't drive (e:drivingSpeed), or that is no e:Stand"
             )
         there = engine.embodiment.stands[stand]
         engine.bases[robot].set(np.array([*there.position[:2], there.yaw]))

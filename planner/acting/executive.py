@@ -313,7 +313,7 @@ class _Run:
             self.belief.add(intervention.individual, (intervention.kind,))
         if goal != self.belief.problem.goal:
             self.belief.want(goal)
-            self.request_replan("something else is wanted")
+            self.request_replan("the goals have changed")
         self.say("intervention", text=intervention.text)
 
     def request_replan(self, why: str, surprises: Sequence[Surprise] = ()) -> None:
@@ -493,7 +493,7 @@ class _Run:
         self.belief.trust_again()
         self.want_again(self.goals.put_off)
         self.agenda.sound = False
-        self.request_replan(f"tried anew: {why}")
+        self.request_replan(f"failed primitives are retried: {why}")
         return True
 
 

@@ -113,7 +113,7 @@ def _download(url: str) -> tuple[bytes, str]:
             if answer.status != 200:
                 raise KnowledgeError(f"{url}: the server answers {answer.status} {answer.reason or ''}".rstrip())
             if answer.headers.get("Content-Encoding", "identity") != "identity":
-                raise KnowledgeError(f"{url}: the server sends compressed data although none was asked for; refused")
+                raise KnowledgeError(f"{url}: the server sends compressed data, which wasn't requested; refused")
             content = b""
             for piece in answer.stream(65536):
                 content += piece

@@ -144,7 +144,7 @@ class KnowledgeGraph:
         for row in self.solutions(query, graphs, **bindings):
             rows.append(tuple(row))
             if not len(rows) % 4096:
-                check("asking the knowledge graph")
+                check("querying the knowledge graph")
         return rows
 
     def solutions(self, query: str, graphs: Sequence[str] = GRAPHS, **bindings: str) -> ox.QuerySolutions:
@@ -170,7 +170,7 @@ class KnowledgeGraph:
 
     def query(self, query: str, graphs: Sequence[str] = GRAPHS, **bindings: str) -> Answer:
         """Return the result of any SPARQL 1.1 query on the union of some graphs; for a remote store, on its own dataset."""
-        check("asking the knowledge graph")
+        check("querying the knowledge graph")
         self.round_trips += 1
         if self.remote:
             return self.remote.query(query, self.prefixes, bindings)
@@ -187,7 +187,7 @@ class KnowledgeGraph:
     def confirm(self) -> None:
         """Raise `KnowledgeError` if the data in a remote store have changed since the data were read."""
         if self.remote:
-            check("asking the knowledge graph again")
+            check("repeating a query to the knowledge graph")
             self.remote.confirm()
 
     def add(self, graph: str, triples: Iterable[tuple[str, str, str]]) -> None:

@@ -100,7 +100,7 @@ class _Checked(BytesIO):
 
     def write(self, content: Buffer, /) -> int:
         """Store the next bytes, or raise `LimitError` after the deadline."""
-        check("handing the scene to a query")
+        check("sending the scene to the query process")
         return super().write(content)
 
 

@@ -207,7 +207,7 @@ def _rules(parts: Parts, schema: Schema, situations: Mapping[str, SituationType]
                     else "make its value property not functional"
                 )
                 raise KnowledgeError(
-                    f"<{iri}> is defined by <{min(by)}>, but has values; what is defined is true or false, or an amount that is "
+                    f"<{iri}> is defined by <{min(by)}>, but has values; a defined situation type is boolean or an amount that is "
                     f"aggregated: {mend}"
                 )
         rules = [parts.rule(rule, kinds) for rule in written[iri]] + by_swrl.get(iri, [])

@@ -254,8 +254,8 @@ class _Imp:
             situation, functional = definitions.situations[predicate]
             if functional:
                 raise self.error(
-                    f"it concludes {local_name(predicate)}, whose values follow from nothing since it is functional: what "
-                    "follows is the value property of a situation type of its own, which isn't functional"
+                    f"it concludes {local_name(predicate)}, which is functional; a rule can derive only the value property of a "
+                    "situation type of its own, which isn't functional"
                 )
         elif len(said) == 1 and predicate:
             raise self.error(

@@ -180,7 +180,7 @@ def _to_updates(file: _File, graph: KnowledgeGraph, schema: Schema, own: Sequenc
         except ValueError as error:
             why = str(error)
         if why:
-            notes.append(f"{local_name(iri)} stays as it is: {why}")
+            notes.append(f"{local_name(iri)} is unchanged: {why}")
             kept |= parts
             continue
         done.append(iri)
@@ -290,7 +290,7 @@ def _why_not(iri: str, parts: Iterable[str], file: _File, schema: Schema) -> str
             if part.rpartition(".")[0] != iri:
                 return f"its term {local_name(part)} isn't called {local_name(iri)}.…"
         elif any(not _replaced(t, False) for s in file.said[part] for t in s.triples):
-            return f"something else is said of {local_name(part)}"
+            return f"{local_name(part)} has other statements, too"
     return ""
 
 
