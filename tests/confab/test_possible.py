@@ -70,7 +70,7 @@ def test_validation_of_a_file_reports_an_impossible_fact_in_the_same_words(tmp_p
         ("not_held", "location2", "", NOT_HELD),
     ):
         text = SCENE.format(name=name, place=place) + more
-        text = text.replace("t:location2", "k:in_hand") if name == "nobody" else text
+        text = text.replace("t:location2", "k:in_hand") if name == "not_held" else text
         (tmp_path / f"{name}.ttl").write_text(text, encoding="utf-8")
         (finding,) = (f for f in validate([tmp_path / f"{name}.ttl"]) if f.rule == "impossible-situation")
         assert finding.what == message.partition(";")[0]
