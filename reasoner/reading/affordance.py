@@ -56,7 +56,7 @@ RELATION_PROPERTIES = (
     "SELECT DISTINCT ?relation WHERE { ?relation a/rdfs:subClassOf* :Relation ; a owl:ObjectProperty }"
 )
 TYPE = ox.NamedNode(RDF + "type")
-SIGNS = {"increase": "+", "decrease": "-"}
+SIGNS = {"increase": "+", "decrease": "-", "scale": "*"}
 MOST_TOGETHER = 3
 """The query tests the bounds of an amount only if at most this many other effects change the same amount."""
 
@@ -202,24 +202,31 @@ def allowed_together(behavior: Behavior, situations: Mapping[str, SituationType]
         quantity = situations[effect.situation].quantity
         every = [other for other in behavior.amounts if other.situation == effect.situation and other is not effect]
         others = [other for other in every if _may_coincide(effect, other)]
-        added = all(one.operation in SIGNS for one in (effect, *others))
-        if quantity is None or not every or not added or len(others) > MOST_TOGETHER:
+        if quantity is None or not every or len(others) > MOST_TOGETHER:
             continue
         for same in product((True, False), repeat=len(others)):
-            total: Expression = Amount(effect.situation, effect.arguments)
-            total = Calculation(SIGNS[effect.operation], total, effect.amount)
-            where: list[Condition] = [*effect.when]
+            where, together = [*effect.when], [effect]
             for other, is_same in zip(others, same, strict=True):
                 pairs = zip(effect.arguments, other.arguments, strict=True)
                 equal = (*(EqualityCondition(a, b) for a, b in pairs if a != b), *other.when)
                 if not (equal or is_same):
                     break  # both effects always change the same symbol
                 if is_same:
-                    total = Calculation(SIGNS[other.operation], total, other.amount)
+                    together.append(other)
                     where += equal
                 else:
                     where.append(AnyOf((equal,), negated=True))
             else:
+                before = Amount(effect.situation, effect.arguments)
+                total: Expression = before
+                for one in (
+                    one for one in behavior.amounts if one in together
+                ):  # in the order in which they are applied
+                    total = (
+                        Calculation(SIGNS[one.operation], total, one.amount) if one.operation in SIGNS else one.amount
+                    )
+                if any(one.operation not in SIGNS for one in together):
+                    where.append(Comparison(before, "=", before))  # an amount that doesn't exist isn't assigned
                 for wrong, limit in (("<", quantity.least), (">", quantity.most)):
                     if limit is not None:
                         yield AnyOf(((*where, Comparison(total, wrong, limit)),), negated=True)

@@ -10,7 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from confab.planner.grounded.grounding import ground as grounded
@@ -28,7 +28,7 @@ from confab.reasoner.reading.affordance import applicable_query, write_situation
 from confab.reasoner.reading.problem import Reading, read
 from confab.reasoner.symbols import FALSE, Condition, Fact, Problem, Symbol
 from tests.planner import naive, small
-from tests.reasoner.worlds import graph_of, worlds
+from tests.reasoner.worlds import HEAD, graph_of, worlds
 from worlds.language import DEFINED, language
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -156,6 +156,20 @@ def test_a_plan_that_relies_on_a_wrong_order_of_effects_is_rejected(mode: str) -
         solve(Request(away, mode))
 
 
+ASSIGNED_AND_DECREASED = f"""{HEAD}
+w:s0 a owl:NamedIndividual, w:Spot .
+w:t0 a owl:NamedIndividual, w:Thing ; w:at w:s0 .
+w:B a owl:NamedIndividual, :Behavior ; :level 1 ; :parameter w:B.x ; :postcondition w:B_all, w:B_one .
+w:B.x a owl:NamedIndividual, :Parameter ; :index 1 ; :termType w:Thing .
+w:B_all a owl:NamedIndividual, :AmountEffect ; :about w:Thing ; :situationType w:FILL ; :change "decrease" ; :amount 1 .
+w:B_one a owl:NamedIndividual, :AmountEffect ; :about w:B.x ; :situationType w:FILL ; :change "assign" ; :amount 0.5 .
+w:task a owl:NamedIndividual, :Task ; :goal w:task.g .
+w:task.g a owl:NamedIndividual, :ValueCondition ; :about w:t0 ; :situationType w:AT ; :value w:s0 .
+"""
+"""A behaviour that assigns an amount and decreases it below its minimum: it is applicable to no individual."""
+
+
+@example(world=ASSIGNED_AND_DECREASED)
 @given(world=worlds())
 @settings(max_examples=max(settings().max_examples // 2, 30))
 def test_queries_on_the_graph_agree_with_all_evaluators(world: str) -> None:

@@ -40,7 +40,8 @@ ANOTHER_PLACE = EqualityCondition("?o", "?p", True)
 REACH = RelationCondition("canReach", ("?h", "?p"))
 REACHED = [("left", "shelf"), ("left", "table"), ("right", "table"), ("right", "sink")]
 PUT = behavior(
-    "PUT", 1, "?h:Hand ?c:Cup ?p:Place", [REACH, has("AT", "?c", "?o"), ANOTHER_PLACE, PLACE_IS_FREE], [becomes("AT", "?c", "?p")], "?o:Place"
+    "PUT", 1, "?h:Hand ?c:Cup ?p:Place", [REACH, has("AT", "?c", "?o"), ANOTHER_PLACE, PLACE_IS_FREE],
+    [becomes("AT", "?c", "?p")], "?o:Place",
 )  # fmt: skip
 WASH = behavior(
     "WASH", 1, "?c:Cup", [has("AT", "?c", "sink"), has("CLEAN", "?c", FALSE)], [becomes("CLEAN", "?c", TRUE)]
