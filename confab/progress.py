@@ -70,7 +70,7 @@ def progress_bar() -> Progress:
     return Progress(*columns, console=console, transient=True, disable=quiet() or not console.is_terminal)
 
 
-def tell(what: str) -> None:
+def announce(what: str) -> None:
     """If stderr isn't a terminal, print the present activity as a line on stderr."""
     if not quiet() and not sys.stderr.isatty():
         print(f"confab: {what}", file=sys.stderr, flush=True)

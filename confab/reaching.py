@@ -29,11 +29,11 @@ def has_robot(scene: Known) -> bool:
     return bool(scene.knowledge.select(ROBOTS))
 
 
-def with_current_reach(scene: S, tell: Callable[[str], None]) -> S:
+def with_current_reach(scene: S, report: Callable[[str], None]) -> S:
     """Return a scene with up-to-date reach facts; a scene without a robot's body is returned unchanged.
 
     If the file of reach facts is missing or older than a file of the scene, the reach facts are checked, and computed if
-    necessary. If the description of the bodies is incomplete, the scene is returned unchanged, and `tell` is called with the name
+    necessary. If the description of the bodies is incomplete, the scene is returned unchanged, and `report` is called with the name
     of the missing statement. The reach facts of shipped scenes are always up to date.
     """
     graph = scene.knowledge
@@ -43,7 +43,7 @@ def with_current_reach(scene: S, tell: Callable[[str], None]) -> S:
         try:
             return with_reach(scene)
         except (KnowledgeError, ImportError) as error:
-            tell(f"what the hands reach isn't known: {error}")
+            report(f"what the hands reach isn't known: {error}")
             return scene
     if graph.path.is_relative_to(ontology.ROOT):
         return scene
@@ -51,14 +51,14 @@ def with_current_reach(scene: S, tell: Callable[[str], None]) -> S:
     own = [path for path in graph.files.values() if not path.is_relative_to(ontology.ROOT)]
     if file.is_file() and file.stat().st_mtime >= max(path.stat().st_mtime for path in own):
         return scene
-    tell("computing what the hands reach")
+    report("computing what the hands reach")
     try:
         reached = with_reach(scene)
         if file.is_file():
             file.touch()
         return reached
     except (KnowledgeError, OSError) as error:
-        tell(f"what the hands reach isn't known: {error}")
+        report(f"what the hands reach isn't known: {error}")
         return scene
 
 

@@ -16,7 +16,7 @@ from confab.memory import Memory, undisturbed
 from confab.planner.plan import Status
 from confab.planner.solve import DEFAULT_MODE, Mode
 from confab.planning import Result
-from confab.progress import progress, tell
+from confab.progress import announce, progress
 from confab.reaching import has_robot, unreached, with_reach
 from confab.reasoner.files import check_replaceable, has_content, made_folder, write_whole
 from confab.reasoner.kinds import FILM, MEMORY, OBSERVED, PLAN, REPORT, RUN, VERDICTS
@@ -86,21 +86,21 @@ def run(job: Job) -> int:
         check_replaceable(job.out / file, kind)
     if job.memory is not None:
         check_replaceable(job.memory, MEMORY)
-    tell("validating")
+    announce("validating")
     with progress("validating") as advance:
         findings = validate([job.scene], done=lambda what: advance(what, 0))
     if findings:
         print(listing(findings))
     if any(finding.serious for finding in findings):
         return NO
-    tell("loading the scene")
+    announce("loading the scene")
     scene = load(job.scene)
     bodies = has_robot(scene)
     physics = find_spec("pybullet") is not None
     if bodies and not physics:
         remark(f"the plan won't be verified, filmed or learned from: {WITHOUT_PHYSICS}")
     scene = with_reach(scene) if bodies and physics else scene
-    tell("planning")
+    announce("planning")
     with progress("planning"):
         memory = job.memory
         remembered = Memory.load(memory, scene) if memory and has_content(memory) else Memory.of(scene)
@@ -114,7 +114,7 @@ def run(job: Job) -> int:
     if dearer := result.dearer():
         remark(dearer)
     for line in unreached(scene) if result.outcome.plan is None and bodies and physics else ():
-        tell(line)
+        announce(line)
     good = result.outcome.plan is not None and (report is None or report.verified) and (physics or not bodies)
     if job.memory and good:
         with undisturbed(job.memory):
@@ -143,7 +143,7 @@ def persuaded(scene: Scene, result: Result, job: Job, plan: Callable[[Scene], Re
     report = verified(scene, result, job)
     while refuted := refuted_in(scene, report):
         known = knowing(scene, refuted)
-        tell(f"refuted: {refuted[-1]}; planning again")
+        announce(f"refuted: {refuted[-1]}; planning again")
         another = plan(known)
         if another.outcome.plan is None or another.plan.primitives == result.plan.primitives:
             break
@@ -157,13 +157,13 @@ def verified(scene: Scene, result: Result, job: Job) -> Report:
     """Verify a plan in physics, show the progress on stderr, and return the report."""
     steps = result.plan.primitives
     video = made_folder(job.out) / "run.mp4" if job.film else None
-    tell(f"carrying out {len(steps)} primitives in physics" + (" and filming them" if video else ""))
+    announce(f"carrying out {len(steps)} primitives in physics" + (" and filming them" if video else ""))
     with progress("carrying out", len(steps)) as advance:
 
         def before(done: int, step: object) -> None:
             advance(str(step), bool(done))
             if done and done % TOLD == 0:
-                tell(f"{done} of {len(steps)} primitives done")
+                announce(f"{done} of {len(steps)} primitives done")
 
         return scene.verify(result, seed=job.seed, video=video, gui=job.gui, noise=job.noise, progress=before)
 

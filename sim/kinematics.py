@@ -81,7 +81,10 @@ def _by_elbow(arm: Arm, r: Array, p: Array, swivel: Array, most: float) -> tuple
 
 
 def _angles_far_from_limits(arm: Arm, r: Array, first: int) -> Array:
-    """Return angles (n, 3) of the spherical joint from joint `first` on; if its outer axes are parallel, angles far from limits."""
+    """Return the angles (n, 3) of the spherical joint that begins at joint `first`.
+
+    If the outer axes are parallel, two solutions exist, and the angles farther from the joint limits are returned.
+    """
     axes, part = arm.axes[first : first + 3], slice(first, first + 3)
     three = three_angles(r, axes)
     if abs(axes[0] @ axes[2]) < 0.5:

@@ -130,7 +130,7 @@ def fillers(method: Method, roles: Sequence[str | None], problem: Problem) -> li
 
 @dataclass(frozen=True)
 class Factor:
-    """A summand of a cogency: its fact, and its weight in ln odds."""
+    """One term of the sum that makes a behaviour's cogency: a fact, and the fact's weight as a logarithm of odds."""
 
     fact: Fact
     weight: float

@@ -162,7 +162,7 @@ def carry_out(call: Call, step: Step) -> None:
 
 
 def with_first_record(experience: Experience, lesson: Lesson, problem: Problem, using: Compiled) -> Lesson:
-    """Return a lesson; if `experience` has no rules, add the record of the lesson's rules on the problem."""
+    """Return a lesson, with the record of how its rules solve the problem if `experience` has no rules yet."""
     if not rules_in(experience):
         alone = Experience("alone")
         alone.learn(lesson)

@@ -84,8 +84,8 @@ def unfolded(aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]]) -> Aggre
     def one(condition: Condition) -> Condition:
         match condition:
             case ValueCondition(situation, arguments, value, negated) if situation in rules:
-                ways = tuple(way(rule, arguments) for rule in rules[situation])
-                return AnyOf(ways, negated is not (value == FALSE))
+                bodies = tuple(body(rule, arguments) for rule in rules[situation])
+                return AnyOf(bodies, negated is not (value == FALSE))
             case Witness(_, _, inner):
                 return replace(condition, conditions=tuple(map(one, inner)))
             case AnyOf(alternatives):
@@ -93,7 +93,7 @@ def unfolded(aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]]) -> Aggre
             case _:
                 return condition
 
-    def way(rule: Rule, arguments: Sequence[str]) -> tuple[Condition, ...]:
+    def body(rule: Rule, arguments: Sequence[str]) -> tuple[Condition, ...]:
         number = next(numbers)
         terms = dict(zip((p.name for p in rule.parameters), arguments, strict=True))
         terms |= {v.name: f"{v.name}_rule{number}" for v in rule.variables}

@@ -266,12 +266,12 @@ class Definitions:
         the situation type has rules that don't follow from axioms.
         """
         said = self.nodes.get(prop, {})
-        ways: list[tuple[str, ...]] = [(other,) for other in self._below(prop)]
-        ways += [tuple(self._items(chain)) for chain in said.get(OWL + "propertyChainAxiom", ())]
+        chains: list[tuple[str, ...]] = [(other,) for other in self._below(prop)]
+        chains += [tuple(self._items(chain)) for chain in said.get(OWL + "propertyChainAxiom", ())]
         types = said.get(RDF + "type", ())
         if OWL + "TransitiveProperty" in types:
-            ways += [(*way, prop) for way in ways if prop not in way] + [(prop, prop)] * more
-        found = [self._way(way, situation, kinds) for way in ways]
+            chains += [(*chain, prop) for chain in chains if prop not in chain] + [(prop, prop)] * more
+        found = [self._chain_rule(chain, situation, kinds) for chain in chains]
         inverses = [*said.get(OWL + "inverseOf", ()), *self._inverses(prop)]
         inverses += [prop] if OWL + "SymmetricProperty" in types and (found or more) else []
         for other in dict.fromkeys(inverses):
@@ -292,15 +292,15 @@ class Definitions:
             iri for iri, node in self.nodes.items() if not _blank(iri) and prop in node.get(OWL + "inverseOf", ())
         )
 
-    def _way(self, way: Sequence[str], situation: str, kinds: Sequence[str]) -> Rule:
+    def _chain_rule(self, chain: Sequence[str], situation: str, kinds: Sequence[str]) -> Rule:
         """Return the rule that a property chain implies."""
         variables: list[Parameter] = []
 
         def rest(place: int, one: str) -> tuple[Condition, ...]:
-            if place == len(way) - 1:
-                return (self.related(way[place], one, "?to"),)
-            middle, kind = f"?middle{place}", self._between(way[place], way[place + 1])
-            link = self.related(way[place], one, middle)
+            if place == len(chain) - 1:
+                return (self.related(chain[place], one, "?to"),)
+            middle, kind = f"?middle{place}", self._between(chain[place], chain[place + 1])
+            link = self.related(chain[place], one, middle)
             inner = rest(place + 1, middle)
             if isinstance(link, ValueCondition) and link.value == middle:
                 variables.append(Parameter(middle, kind))

@@ -1,7 +1,7 @@
 """Validation rule on exclusive values: no behaviour may give a second individual a value that physically has only one holder.
 
 The ontology declares exclusive values by ``e:exclusive`` of a perceiver, for example that at most one hand holds an
-object. A behaviour that gives an exclusive value to an individual must ensure in one of three ways that no other
+object. A behaviour that gives an exclusive value to an individual must ensure in one of three alternatives that no other
 individual has the value. Each level is checked separately.
 
 - *free*: The preconditions require that no individual has the value.
@@ -55,7 +55,7 @@ def values_not_kept_exclusive(case: Case) -> Iterator[Fault]:
 
 @dataclass(frozen=True)
 class _Taken:
-    """A state of a value that excludes a holder of this value: the value's `situation` is a member of `kind`, or equals `value`."""
+    """A state in which a value has no holder: the value's `situation` is a member of `kind`, or equals `value`."""
 
     situation: str
     kind: str
@@ -81,11 +81,13 @@ class _Exclusive:
             and not self.handed_over(behavior, effect)
         ]
         for behavior, effect in open_:
-            ways = [*self.taken(behavior, effect)]
-            if any(not [*self.breaking(way, behaviors)] for way in ways):
+            alternatives = [*self.taken(behavior, effect)]
+            if any(not [*self.breaking(excluding, behaviors)] for excluding in alternatives):
                 continue
-            if len(ways) == 1 and behavior.name not in {other.name for other, _ in self.breaking(ways[0], behaviors)}:
-                for other, does in self.breaking(ways[0], behaviors):
+            if len(alternatives) == 1 and behavior.name not in {
+                other.name for other, _ in self.breaking(alternatives[0], behaviors)
+            }:
+                for other, does in self.breaking(alternatives[0], behaviors):
                     yield (
                         other,
                         f"{other.name} {does} while a {self.kind} may have the same {self.situation}; "
@@ -167,44 +169,44 @@ class _Exclusive:
         for condition in (*behavior.preconditions, *effect.when):
             match condition:
                 case ValueCondition(situation, (about,), before, False) if about == effect.value:
-                    way = _Taken(situation, behavior.kinds.get(before, ""), before if before[:1] != "?" else "")
-                    if situation != self.situation and self.leaves(way, behavior, effect):
-                        yield way
+                    excluding = _Taken(situation, behavior.kinds.get(before, ""), before if before[:1] != "?" else "")
+                    if situation != self.situation and self.leaves(excluding, behavior, effect):
+                        yield excluding
                 case _:
                     pass
 
-    def leaves(self, way: _Taken, behavior: Behavior, effect: ValueEffect) -> bool:
-        """Return whether an effect's value has the state `way` before the behaviour and not after the behaviour."""
+    def leaves(self, excluding: _Taken, behavior: Behavior, effect: ValueEffect) -> bool:
+        """Return whether an effect's value has the state `excluding` before the behaviour and not after the behaviour."""
         value = effect.value
         before = any(
             isinstance(c, ValueCondition)
-            and (c.situation, c.arguments, c.negated) == (way.situation, (value,), False)
-            and self.inside(way, c.value, behavior)
+            and (c.situation, c.arguments, c.negated) == (excluding.situation, (value,), False)
+            and self.inside(excluding, c.value, behavior)
             for c in (*behavior.preconditions, *effect.when)
         )
         return before and any(
-            (e.situation, e.arguments) == (way.situation, (value,))
+            (e.situation, e.arguments) == (excluding.situation, (value,))
             and {*e.when} <= {*effect.when}
-            and not self.may_be_inside(way, e.value, behavior)
+            and not self.may_be_inside(excluding, e.value, behavior)
             for e in behavior.effects
         )
 
-    def breaking(self, way: _Taken, behaviors: Sequence[Behavior]) -> Iterator[tuple[Behavior, str]]:
-        """Yield the behaviours, with their effect in words, after which a value in the state `way` may have a holder."""
+    def breaking(self, excluding: _Taken, behaviors: Sequence[Behavior]) -> Iterator[tuple[Behavior, str]]:
+        """Yield the behaviours, with their effect in words, after which a value in the state `excluding` may have a holder."""
         for behavior in behaviors:
             for effect in self.given(behavior):
-                if not self.handed_over(behavior, effect) and not self.leaves(way, behavior, effect):
+                if not self.handed_over(behavior, effect) and not self.leaves(excluding, behavior, effect):
                     yield behavior, f"gives {self.situation} the value {effect.value.lstrip('?')}"
             for effect in behavior.effects:
-                if effect.situation != way.situation or len(effect.arguments) != 1:
+                if effect.situation != excluding.situation or len(effect.arguments) != 1:
                     continue
-                if not self.may_be_inside(way, effect.value, behavior):
+                if not self.may_be_inside(excluding, effect.value, behavior):
                     continue
                 (about,) = effect.arguments
                 stays = any(
                     isinstance(c, ValueCondition)
-                    and (c.situation, c.arguments, c.negated) == (way.situation, (about,), False)
-                    and self.inside(way, c.value, behavior)
+                    and (c.situation, c.arguments, c.negated) == (excluding.situation, (about,), False)
+                    and self.inside(excluding, c.value, behavior)
                     for c in (*behavior.preconditions, *effect.when)
                 )
                 let_go = any(
@@ -212,25 +214,25 @@ class _Exclusive:
                     for holder in self.holders(behavior, effect.when, about)
                 )
                 if not stays and not let_go and not self.free(behavior, effect.when, about):
-                    said = f"{way.situation} of {about.lstrip('?')} the value {effect.value.lstrip('?')}"
+                    said = f"{excluding.situation} of {about.lstrip('?')} the value {effect.value.lstrip('?')}"
                     yield behavior, f"gives {said}"
 
-    def inside(self, way: _Taken, term: str, behavior: Behavior) -> bool:
-        """Return whether a term certainly denotes one of the values that define the state `way`."""
+    def inside(self, excluding: _Taken, term: str, behavior: Behavior) -> bool:
+        """Return whether a term certainly denotes one of the values that define the state `excluding`."""
         if term[:1] == "?":
-            return bool(way.kind) and self.below(behavior.kinds.get(term, ""), way.kind)
-        return term == way.value or term in self.problem.classes.get(way.kind, ())
+            return bool(excluding.kind) and self.below(behavior.kinds.get(term, ""), excluding.kind)
+        return term == excluding.value or term in self.problem.classes.get(excluding.kind, ())
 
-    def may_be_inside(self, way: _Taken, term: str, behavior: Behavior) -> bool:
-        """Return whether a term may denote one of the values that define the state `way`."""
+    def may_be_inside(self, excluding: _Taken, term: str, behavior: Behavior) -> bool:
+        """Return whether a term may denote one of the values that define the state `excluding`."""
         if term[:1] != "?":
-            return self.inside(way, term, behavior)
+            return self.inside(excluding, term, behavior)
         kind = behavior.kinds.get(term, "")
         members = {*self.problem.classes.get(kind, ())}
-        if way.value:
-            return way.value in members
-        both = self.below(kind, way.kind) or self.below(way.kind, kind)
-        return both or not members.isdisjoint(self.problem.classes.get(way.kind, ()))
+        if excluding.value:
+            return excluding.value in members
+        both = self.below(kind, excluding.kind) or self.below(excluding.kind, kind)
+        return both or not members.isdisjoint(self.problem.classes.get(excluding.kind, ()))
 
     def below(self, kind: str, other: str) -> bool:
         """Return whether every individual of a class or union of classes belongs to another class or union."""
