@@ -8,7 +8,7 @@ world.
 docs/levels.md defines the meaning of a plan with several levels. After the refinement of a step, the symbols that the step's
 level sees have the values that the step states. Symbols of the level below that changed and have a rest value are then at rest.
 The next step begins in the state after the refinement. Several steps that are refined together are applied one after another to
-the state that their level sees; the resulting values are those that the steps state together.
+the state that their level sees; their common refinement has to lead to the resulting values.
 """
 
 from __future__ import annotations

@@ -200,7 +200,7 @@ def _told_by(triple: ox.Quad) -> str | None:
 def _rows(file: Path, suffix: str | None) -> Kind:
     """Return the kind of a text that no other check recognises.
 
-    The text has query results if its first line lists columns in the format of the suffix.
+    The text has query results if its first line is a list of column names, in the format that the file's suffix demands.
     """
     with file.open(encoding="utf-8", errors="replace", newline="") as lines:
         first = lines.readline(HEAD_BYTES).rstrip("\r\n")

@@ -120,7 +120,10 @@ def _numbers(mask: int) -> list[int]:
 
 
 def _all_set(flags: Flags, columns: Sequence[Ints]) -> Flags:
-    """Return, for each row, whether all its bits are set; all columns but the first may end before the last row."""
+    """Return, for each row of a table of bits, whether all bits of the row are set in `flags`.
+
+    A column other than the first one may be shorter than the table; its missing bits count as set.
+    """
     found: Flags = flags[columns[0]]
     for column in columns[1:]:
         found[: len(column)] &= flags[column]
