@@ -43,7 +43,7 @@ def with_current_reach(scene: S, report: Callable[[str], None]) -> S:
         try:
             return with_reach(scene)
         except (KnowledgeError, ImportError) as error:
-            report(f"what the hands reach isn't known: {error}")
+            report(f"the reach of the hands isn't known: {error}")
             return scene
     if graph.path.is_relative_to(ontology.ROOT):
         return scene
@@ -51,14 +51,14 @@ def with_current_reach(scene: S, report: Callable[[str], None]) -> S:
     own = [path for path in graph.files.values() if not path.is_relative_to(ontology.ROOT)]
     if file.is_file() and file.stat().st_mtime >= max(path.stat().st_mtime for path in own):
         return scene
-    report("computing what the hands reach")
+    report("computing the reach of the hands")
     try:
         reached = with_reach(scene)
         if file.is_file():
             file.touch()
         return reached
     except (KnowledgeError, OSError) as error:
-        report(f"what the hands reach isn't known: {error}")
+        report(f"the reach of the hands isn't known: {error}")
         return scene
 
 
@@ -79,7 +79,7 @@ def with_reach(scene: S) -> S:
 
     if reach_hash(scene.knowledge) == fingerprint(scene.embodiment):
         return scene
-    log.info("computing what the hands of %s reach", scene.iri)
+    log.info("computing the reach of the hands of %s", scene.iri)
     try:
         reached = reach(scene.embodiment)
     except ValueError as error:

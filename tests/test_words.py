@@ -75,6 +75,17 @@ def test_no_pronoun_stands_for_a_missing_noun() -> None:
     assert found == {}, "name the object, role, step or value instead of a pronoun"
 
 
+def test_names_of_tests_have_no_pronouns_for_missing_nouns() -> None:
+    names = [
+        name
+        for file in (ROOT / "tests").rglob("test_*.py")
+        for name in re.findall(r"def (test_\w+)", file.read_text("utf-8"))
+    ]
+    assert len(names) > 1000
+    found = [name for name in names if re.search(r"_(who|whom|whoever|nobody|somebody|anybody)_", name)]
+    assert found == [], "name the object, role, step or value instead of a pronoun"
+
+
 def test_no_phrase_is_a_riddle() -> None:
     found = {file: words for file, text in texts().items() if (words := [m[0] for m in RIDDLES.finditer(text)])}
     assert found == {}, "use the field's verb or noun"

@@ -83,7 +83,7 @@ def memory_for(path: Path | None, none: bool, scene: Scene) -> Memory | None:
     except KnowledgeError as error:
         if not path.is_file():
             raise
-        remark(f"{error}; planning goes on without memory")
+        remark(f"{error}; planning continues without memory")
         return None
 
 

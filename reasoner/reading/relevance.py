@@ -111,7 +111,7 @@ def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
             f"a condition, an effect or a goal leads to something without a name (_:{nameless[0]}), where an individual belongs"
         )
     fresh = search.visit(seeds | constants)
-    check("recognising what the task needs")
+    check("recognising the relevant part of the scene")
     lifted = frame(schema, [member for member in search.members() if member[0] in constants])
     bounds = routes(lifted, [goal.split()[1] for goal in goals if " " in goal.strip()])
     search.close(fresh, constants, bounds)

@@ -186,7 +186,7 @@ class _Imp:
             waiting = [one for one in waiting if one not in ready]
         for _, (_, *given) in waiting:
             lost = next(self.word(argument) for argument in given if not self._known(argument))
-            raise self.error(f"nothing says which number {lost} is; add an atom of an amount with it")
+            raise self.error(f"no atom determines the number {lost}; add an atom of an amount with it")
 
     @staticmethod
     def _built_in(predicate: str, known: Mapping[str, str]) -> bool:
@@ -200,7 +200,7 @@ class _Imp:
             return self.amounts[argument]
         found = exact(argument)
         if found is None:
-            raise self.error(f"nothing says which number {self.word(argument)} is; add an atom of an amount with it")
+            raise self.error(f"no atom determines the number {self.word(argument)}; add an atom of an amount with it")
         return found
 
     def _said(self, predicate: str, said: tuple[str, ...]) -> None:
@@ -278,7 +278,9 @@ class _Imp:
             term = self.term(argument)
             if self.variable(argument) and term not in [p.name for p in parameters]:
                 if not any(term in mentions(condition) for condition in self.asked) and term not in self.kinds:
-                    raise self.error(f"the variable {term} of its head is in no atom of its body; say there what it is")
+                    raise self.error(
+                        f"the variable {term} of its head is in no atom of its body; add an atom with it there"
+                    )
                 parameters.append(Parameter(term, self.kinds.get(term, kind)))
             else:
                 parameters.append(Parameter(f"?argument{place}", kind))
@@ -311,5 +313,5 @@ class _Imp:
 
     def _kind(self, variable: str) -> str:
         if variable not in self.kinds:
-            raise self.error(f"nothing says the class of {variable}; add an atom of a class with it")
+            raise self.error(f"no atom states the class of {variable}; add an atom of a class with it")
         return self.kinds[variable]

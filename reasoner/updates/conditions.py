@@ -167,7 +167,7 @@ class Conditions:
         alternatives = []
         for group in groups:
             if not group:
-                raise UpdateError("an alternative is empty", "take it out, or say what has to hold", at)
+                raise UpdateError("an alternative is empty", "remove it, or write its condition", at)
             if len(group) == 1:
                 alternatives.append(group[0])
                 continue

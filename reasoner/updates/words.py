@@ -175,7 +175,9 @@ def _aggregated(head: Triple, select: Any) -> Construction:
         )
     if inner.distinct:
         raise UpdateError(
-            "DISTINCT isn't supported", "seek what shall not be counted by FILTER EXISTS { … }", computed[0].evar.at
+            "DISTINCT isn't supported",
+            "put the conditions on variables that aren't counted into FILTER EXISTS { … }",
+            computed[0].evar.at,
         )
     argument = None if found[1] == "Count" else inner.vars
     return Construction(

@@ -44,7 +44,7 @@ def test_reach_facts_are_computed_if_they_are_missing_or_outdated(tmp_path: Path
     assert with_current_reach(confab.load(scene), said.append).plan().solved
     before = reach.read_text()
     with_current_reach(confab.load(scene), said.append)
-    assert said == ["computing what the hands reach"]
+    assert said == ["computing the reach of the hands"]
     table = tmp_path / "shop-table.ttl"
     table.write_text(table.read_text().replace("e:x 0.4 ; e:y 0.2 ;", "e:x 0.4 ; e:y 0.48 ;"))
     os.utime(table, (reach.stat().st_mtime + 5,) * 2)

@@ -39,7 +39,7 @@ FEE = """
         (":PUSH.cart ; c:situationType :PARKED ; c:value :PUSH.room ; rdfs", ":PUSH.cart ; c:situationType :FULL ; rdfs",
          "theatre", "PUSH.there", "changes FULL, which is defined by the class FullCart", "remove the effect"),
         ("# What follows.", FREE, "theatre", "Stowed",
-         "the SWRL rule 'all stowed': the variable ?prop of its head is in no atom of its body", "say there what it is"),
+         "the SWRL rule 'all stowed': the variable ?prop of its head is in no atom of its body", "add an atom with it there"),
         ('c:change "decrease" ; c:amount 0.5 ;', 'c:change "decrease" ; c:right :fee1 ;' , "theatre", "SWITCH",
          "SWITCH combines numbers in h and EUR (FEE and HOURS)", "use amounts of one unit"),
         ("d:hours 0.5", "d:hours -0.5", "first-night", "spot2", "<spot2, HOURS> is -0.5; it has to be at least",
