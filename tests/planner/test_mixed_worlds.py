@@ -10,6 +10,7 @@ import pytest
 
 from confab.planner.plan import Plan, Status, Step
 from confab.planner.validation import BehaviorReader
+from confab.reasoner.derivation import strata
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import LimitError
 from confab.reasoner.reading.problem import read
@@ -89,6 +90,18 @@ def test_small_worlds_with_all_constructs_give_no_wrong_answer(first: int, tmp_p
         its = Judge(world, tmp_path, meant=meant).judged()
         wrong += [(seed, one.kind, one.mode, one.text) for one in its.complaints]
     assert not wrong
+
+
+@pytest.mark.usefixtures("unlimited_judge")
+def test_worlds_whose_situation_types_define_each_other_give_no_wrong_answer(tmp_path: Path) -> None:
+    wrong, defined = [], 0
+    for seed in range(8_300_000, 8_300_006):
+        world, meant = drawn(seed, mutual=1.0)
+        defined += any(len(group) > 1 for group in strata(world.problem.domain.rules))
+        its = Judge(world, tmp_path, meant=meant).judged()
+        wrong += [(seed, one.kind, one.mode, one.text) for one in its.complaints]
+    assert not wrong
+    assert defined > 1
 
 
 @pytest.mark.usefixtures("unlimited_judge")
