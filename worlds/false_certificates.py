@@ -110,8 +110,9 @@ def disproved(meant: Interpreter, certificate: Certificate, symbol: Symbol, valu
     """Return whether a state that a certificate allows leads to a state that the certificate excludes.
 
     A tested state is a reachable state with another value of the symbol whose claim was removed. All other claims of the
-    certificate hold in a tested state. The plain interpreter, which shares no code with the checker, searches for the goal or
-    the opposite of a claim.
+    certificate hold in a tested state, and the state belongs to the case of the reachable state: sums that the certificate
+    tells apart are unchanged. The plain interpreter, which shares no code with the checker, searches for the goal or the
+    opposite of a claim.
     """
     at, level = meant.slots.get(symbol), meant.problem.domain.levels[-1]
     if at is None or at >= meant.stated or meant.kinds[symbol.situation].quantity is not None:
@@ -127,6 +128,11 @@ def disproved(meant: Interpreter, certificate: Certificate, symbol: Symbol, valu
             if quantity is not None and state[slot] is not None
         )
 
+    def of_one_case(state: State, changed: State) -> bool:
+        return all(
+            meant.value(state, one) == meant.value(changed, one) for one in certificate.told_apart if one != symbol
+        )
+
     def allowed(state: State) -> bool:
         never = any(meant.meets(state, fact.symbol, fact.value) for fact in certificate.never)
         return not never and all(meant.meets(state, one, value) for one, value in certificate.always.items())
@@ -137,7 +143,7 @@ def disproved(meant: Interpreter, certificate: Certificate, symbol: Symbol, valu
         for state in sorted(reached, key=str)[:SAMPLE]:
             for value in values:
                 other.initial = meant.closed([*state[:at], value, *state[at + 1 :]])
-                if possible(other.initial) and allowed(other.initial):
+                if possible(other.initial) and allowed(other.initial) and of_one_case(state, other.initial):
                     found = other.explored(level, MOST_STATES, rests=False)
                     if found.least is not None or not all(allowed(after) for after, _ in found.costs):
                         return True

@@ -104,6 +104,11 @@ def test_worlds_whose_situation_types_define_each_other_give_no_wrong_answer(tmp
     assert defined > 1
 
 
+def test_a_certificate_that_tells_a_sum_apart_is_refuted_only_by_states_with_the_same_sum(tmp_path: Path) -> None:
+    world, meant = drawn(493_002_793, constrained=0.3)
+    assert not Judge(world, tmp_path, only="proofs", meant=meant).judged().complaints
+
+
 @pytest.mark.usefixtures("unlimited_judge")
 @pytest.mark.parametrize("seed", [95_006_284, 95_012_744, 95_017_985])
 def test_no_mode_refuses_a_division_by_an_amount_that_changes(seed: int, tmp_path: Path) -> None:
