@@ -158,7 +158,7 @@ def some_installed(problem: Problem) -> bool:
 
 
 def at_rest(problem: Problem, level: int) -> dict[Symbol, str]:
-    """Return the initial values that a plan must restore: the rest values of symbols that the first level doesn't see."""
+    """Return the initial values that a plan must restore: the rest values of symbols that don't exist on the first level."""
     first = problem.domain.levels[0]
     return {symbol: value for symbol, value in problem.at_rest(level).items() if first < problem.first_level(symbol)}
 

@@ -1,4 +1,4 @@
-"""Explanation of why a memory prefers a behaviour: the learned rule, the rule's episodes, and the summands of the cogency."""
+"""Explanation of why a memory prefers a behaviour: the learned rule, the rule's episodes, and the weight of each fact."""
 
 from __future__ import annotations
 
@@ -215,7 +215,7 @@ def _best(alternatives: Sequence[RuleInstance], advisor: Advisor, reader: FactRe
 def _differences(
     chosen: RuleInstance, other: RuleInstance, advisor: Advisor, reader: FactReader, say: Sayings
 ) -> tuple[Why, ...]:
-    """Return the differences between the cogencies of two rule instances, summand by summand, the greatest difference first."""
+    """Return the differences between the cogencies (scores) of two rule instances, fact by fact, the greatest difference first."""
     facts: list[dict[str, tuple[Fact, float]]] = []
     for c in (chosen, other):
         factors = advisor.scorer.factors(c.rule, reader.facts(c.rule, c.roles), reader.individuals(c.rule, c.roles))

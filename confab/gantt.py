@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from confab.labels import Labels
 
 TALL, LINES = 21, 2.8
-"""Maximum number of characters in a line of text on a bar, and number of lines that fit on a bar per second of its duration."""
+"""Maximum number of characters per line of a bar's text, and maximum number of lines per second of the bar's duration."""
 
 
 def save_gantt(

@@ -262,13 +262,13 @@ def score(wanted: tuple[str, ...], name: str, doc: str) -> float:
 TYPED = 0.85
 """Minimum similarity to a known name for a wrong name to be treated as a typing error."""
 PART = 0.6
-"""Score of a word that a table's entry has only as a part of longer names."""
+"""Score of a matching word that is only a part of a longer name in the table."""
 OWN = 0.1
-"""Bonus for a word that is itself the suggested name of a table's entry."""
+"""Bonus for a matching word that is the name which the table's entry suggests."""
 UNKNOWN = 0.4
 """Weight of a word that occurs in no entry of a table."""
 HALF = 0.75
-"""Factor for an entry in which the words of a wrong name occur only in longer names."""
+"""Factor for an entry of a table in which all matching words are only parts of longer names."""
 KNOWN_WORDS = 0.4
 """An entry of a table must have at least this share of the words of a wrong name; rare words weigh more."""
 
@@ -379,7 +379,7 @@ def chosen(name: str, known: Iterable[str]) -> str:
 
 
 def needless(name: str) -> str:
-    """Return why a function or a command that lacks a parameter doesn't need it, or an empty text.
+    """Return the reason why a function or a command needs no parameter of this name, or an empty text.
 
     >>> needless("random_state")
     'the same call gives the same result in every process'

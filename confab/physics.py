@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 class SuccessJson(TypedDict):
-    """The number of verified rollouts, the confidence interval of their rate, and the mean share of a serving that was poured."""
+    """The number of verified rollouts, the confidence interval of the success rate, and the mean poured share of a serving."""
 
     verified: int
     of: int
@@ -308,7 +308,7 @@ def verify(
 
 
 def on_trust(scene: Known, expected: Sequence[State]) -> dict[str, int]:
-    """Return, by situation type, the numbers of changes between successive states that no perceiver observes."""
+    """Return, by situation type, how many changes between successive states no perceiver observes."""
     counts: dict[str, int] = {}
     for before, after in pairwise((scene.problem.initial, *expected)):
         for symbol in {*before, *after}:

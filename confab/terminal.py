@@ -197,7 +197,7 @@ PARAMETER = re.compile(
     r"(?<![\w'])(?P<name>engine|gui|memory|minimise|mode|optimal|port|scene|time_limit|video)=(?P<value>None|True|'\w[\w-]*'|)"
     r"(?=[\s),;.]|$)"
 )
-"""Pattern of a Python parameter, perhaps with a value, if the command line has an option of the same name."""
+"""Pattern of a Python parameter, perhaps with a value, that also exists as an option of the command line."""
 
 
 PLAINER = (
@@ -206,7 +206,7 @@ PLAINER = (
     (r"([-\d.e+]+) is not in the range x>(=?)([-\d.e+]+)$", r"\1; wanted a number >\2 \3"),
     (r"([-\d.e+]+) is not in the range ([-\d.e+]+)<=x<=([-\d.e+]+)$", r"\1; wanted a number from \2 to \3"),
 )
-"""Patterns of messages about numbers by the library click, each with plain words that replace the message."""
+"""Patterns of messages about numbers from the library click, each with a plainer wording."""
 
 
 def _usage(error: Any) -> str:

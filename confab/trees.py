@@ -56,7 +56,7 @@ class Element:
 
     The kinds are Fallback, Sequence, Once, Parallel, SubTree, Check, Set, Again, Condition and Action. The nodes Fallback and
     Sequence begin with their first child in each tick. A Once node is a sequence that resumes at its running child. `name` is the
-    name of a subtree, of a leaf, or of a mark, which is the flag of a finished step. `key` identifies a leaf.
+    name of a subtree, a leaf or a mark; a mark is a flag which states that a step is finished. `key` identifies a leaf.
     """
 
     kind: str

@@ -111,9 +111,9 @@ class Because:
 class WhyNot:
     """The reasons why an alternative isn't in the plan.
 
-    `answer` is the answer as a sentence. If the alternative is inapplicable, `lacks` has its failing conditions. If a complete
-    plan with the alternative was found, `plan` is this plan, and `more` is its additional cost. `breaks` has the conditions of
-    upper levels that the plan with the alternative violates, but not the present plan.
+    `answer` is the answer as a sentence. If the alternative is inapplicable, `lacks` has its failing conditions. If a complete plan
+    with the alternative was found, `plan` is this plan, and `more` is its additional cost. `breaks` has the conditions of upper
+    levels that the plan with the alternative violates and the present plan meets.
     """
 
     asked: str

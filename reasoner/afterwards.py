@@ -93,7 +93,7 @@ def negation(formula: Formula | Conjunction) -> Formula:
 
 
 def _binding(condition: Condition) -> bool:
-    """Return whether a condition may determine the value of a variable that the negated condition doesn't determine."""
+    """Return whether a condition may determine the value of a variable; its negation then doesn't determine the value."""
     return isinstance(condition, ValueCondition) and not condition.negated and is_variable(condition.value)
 
 
@@ -104,7 +104,7 @@ class Afterwards:
     Parameters
     ----------
     behavior : Behavior
-        The behaviour, in which an effect on all members of a class is still a single effect.
+        The behaviour, whose effects on all members of a class aren't yet expanded to one effect per member.
     situations : mapping of name to SituationType
     classes : mapping of class to individuals
     kinds : dict of term to class
@@ -150,7 +150,7 @@ class Afterwards:
     def amounts(self) -> tuple[AmountEffect, ...]:
         """The effects on amounts.
 
-        An effect for each member of a class is expanded, unless the member is an argument of the amount.
+        An effect on each member of a class is replaced by one effect per member, unless the member is an argument of the amount.
         """
         found: list[AmountEffect] = []
         for effect in self.behavior.amounts:
@@ -180,7 +180,7 @@ class Afterwards:
                 return condition
 
     def apart(self, effect: Effect) -> Effect:
-        """Return an effect in which new variables replace the variables of the effect's own conditions."""
+        """Return a copy of an effect with new names for the effect's own variables."""
         given = (effect.value,) if isinstance(effect, ValueEffect) else terms_of(effect.amount)
         own = {*effect.arguments, *given}.union(*map(mentions, effect.when))
         own = {term for term in own if is_variable(term)} - self._fixed - ({effect.each.name} if effect.each else set())
@@ -286,7 +286,7 @@ class Afterwards:
         return negation(found) if negated else found
 
     def _overwritten(self, effect: ValueEffect, arguments: tuple[str, ...], value: str, before: Formula) -> Formula:
-        """Return the condition that a symbol has a value after an effect, given the condition without this effect."""
+        """Return the condition that a symbol has a value after an effect; `before` is this condition without the effect."""
         apart = self.apart(effect)
         assert isinstance(apart, ValueEffect)
         fires = self.fires(apart, arguments)
@@ -308,15 +308,14 @@ class Afterwards:
         ----------
         expression : Expression
         operation : str
-            The operation on the whole expression that an increase of the given part causes (a key of `OPPOSITE`).
+            The change of the whole expression if `expression`, a part of it, increases: ``increase`` or ``decrease``.
         scaled : callable
-            A function that returns the change of the whole expression for a change of the given part.
+            A function that maps a change of this part to the change of the whole expression.
 
         Returns
         -------
         list of (Amount, str, callable) or None
-            For each amount: the amount, the operation on the whole expression that its increase causes, and a function that
-            returns the change. None if the expression isn't linear.
+            For each changing amount: the amount, its `operation` and its `scaled`. None if the expression isn't linear.
         """
         found: list[list[Term] | None]
         match expression:
@@ -384,7 +383,7 @@ def _changed(now: Expression, operation: str, by: Expression) -> Expression:
 
 
 def closed(conditions: Iterable[Condition], bound: frozenset[str], kinds: Mapping[str, str]) -> tuple[Condition, ...]:
-    """Return conditions in which witnesses quantify the variables that occur only inside disjunctions or other witnesses.
+    """Return conditions with an explicit witness for each variable that occurs only inside a disjunction or another witness.
 
     >>> (found,) = closed([AnyOf(((ValueCondition("ON", ("?a",), "?b"),),))], frozenset({"?a"}), {"?b": "Shelf"})
     >>> found.alternatives[0][0].variable

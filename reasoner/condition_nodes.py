@@ -128,7 +128,7 @@ class NodeWriter:
         A function that returns the Turtle notation of a witness variable, given its name, the witness's node and the position of
         this node.
     terms : mapping of variable to Turtle notation
-        The parameters, and the variables that are bound outside the conditions, with their Turtle notation.
+        The Turtle notation of the parameters, and of the variables that are bound outside the conditions.
     boolean : callable, optional
         A function that returns whether the value `TRUE` of a situation type can be omitted.
 
@@ -208,7 +208,7 @@ class NodeWriter:
         return node
 
     def groups(self, alternatives: Sequence[Sequence[Condition]], node: str) -> list[str]:
-        """Write the alternatives of a disjunction, and return their nodes.
+        """Write the alternatives of a disjunction as nodes, and return these nodes.
 
         An alternative with a single condition is represented by the node of the condition.
         """

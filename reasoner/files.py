@@ -167,7 +167,7 @@ def _replaceable(target: Path) -> os.stat_result | None:
 
 
 def _same_kind(target: Path, new: Kind | None) -> None:
-    """Raise `FileExistsError` if new content must not replace a file, because the file's content is of another kind."""
+    """Raise `FileExistsError` if a file has a kind of content that the new content must not replace."""
     old = kind_of(target)
     if old is not None and (new is None or not new.replaces(old)):
         what = "this output" if new is None or new.name == old.name else new.name
@@ -179,8 +179,8 @@ def _same_kind(target: Path, new: Kind | None) -> None:
 def alone(path: Path) -> Iterator[None]:
     """Lock a file during a ``with`` block; callers that lock another file in the same folder have to wait.
 
-    The folder is locked, so that no lock file remains. Symbolic links are followed, so that all paths to a file share one lock. A
-    warning is logged if the caller has to wait.
+    The lock is on the folder; therefore, no lock file remains. Symbolic links are followed, so that all paths to a file share one
+    lock. A warning is logged if the caller has to wait.
 
     Raises
     ------

@@ -1,8 +1,7 @@
 """Constant folding: removal of the parts of conditions and effects that are always true or always false.
 
 Regression (`confab.reasoner.afterwards`) replaces terms by individuals and numbers, and duplicates conditions. After regression,
-parts such as ``a1 = a2``, ``1 < 2``, a witness of a non-empty class, or a condition beside its own negation don't depend on the
-state.
+some parts don't depend on the state: for example ``a1 = a2``, ``1 < 2``, or a conjunction of a condition and its negation.
 """
 
 from __future__ import annotations

@@ -72,7 +72,7 @@ class Kind:
 
 
 def stamped(kind: str, content: Iterable[str], comment: str = "#") -> Iterator[str]:
-    """Yield the pieces of a text and then a stamp: a comment that identifies the kind of the text until the text is edited.
+    """Yield the pieces of a text and then a stamp, which is a comment with the kind of the text and a hash of its content.
 
     >>> print("".join(stamped("a text", ["one"])).strip())
     one
@@ -200,7 +200,7 @@ def _told_by(triple: ox.Quad) -> str | None:
 def _rows(file: Path, suffix: str | None) -> Kind:
     """Return the kind of a text that no other check recognises.
 
-    The text has query results if its first line is a list of column names, in the format that the file's suffix demands.
+    A text contains query results if its first line is a list of columns in the file format that the suffix denotes.
     """
     with file.open(encoding="utf-8", errors="replace", newline="") as lines:
         first = lines.readline(HEAD_BYTES).rstrip("\r\n")

@@ -120,6 +120,6 @@ def _unbound(group: Sequence[Condition]) -> set[str]:
 
 
 def nothing_determines(where: str, waiting: Sequence[Condition], bound: AbstractSet[str]) -> DomainError:
-    """Return the error for a behaviour with conditions whose variables no condition binds."""
+    """Return the error for a behaviour in which no condition determines the value of some variables."""
     unbound = ", ".join(sorted({term for condition in waiting for term in needs(condition)} - bound))
     return DomainError(f"{where}: nothing determines {unbound}; add a value condition that does")

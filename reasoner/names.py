@@ -104,7 +104,8 @@ def local_name(iri: str) -> str:
 
 
 SHORT = 4
-"""Maximum length of words in which an exchange of two letters reduces the similarity below 0.75."""
+"""Maximum length of short words, for which a similarity of 0.6 suffices in place of 0.75, since an exchange of two letters reduces
+the similarity more."""
 
 
 def nearest(word: str, known: Iterable[str], hint: str = "") -> str:
@@ -125,7 +126,8 @@ def _ontology_name(iri: str) -> str:
 FEW_NAMES = 40
 """Maximum number of names that are listed in an error if no name is similar to the wrong name."""
 GUESSING: list[str] = []
-"""Modules with functions `guessed`, `chosen` and `needless` for the meaning of a wrong name; `confab` adds one module."""
+"""Names of modules that suggest the right name for a wrong name, by functions `guessed`, `chosen` and `needless`; `confab` adds one
+module."""
 
 
 class RightNames(ABCMeta):

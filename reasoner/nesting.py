@@ -12,7 +12,8 @@ from xml.parsers import expat
 MOST_NESTED = 1_000
 """Maximum nesting depth of a document; all parsers in use can read this depth. The nesting depth of ontologies is about ten."""
 PIECE = 256
-"""Number of bytes that are counted at once; the depth may be overestimated by at most this number."""
+"""Number of bytes in a piece of the document. Brackets are counted piece by piece, so that the depth may be overestimated by at
+most this number."""
 TURTLE = re.compile(
     rb'"""[^"\\]*(?:(?:\\.|"(?!""))[^"\\]*)*"""|\'\'\'[^\'\\]*(?:(?:\\.|\'(?!\'\'))[^\'\\]*)*\'\'\'|'
     rb'"[^"\\\n]*(?:\\.[^"\\\n]*)*"|\'[^\'\\\n]*(?:\\.[^\'\\\n]*)*\'|<[^<>"{}|^`\\\s]*>|#[^\n]*',

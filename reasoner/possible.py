@@ -79,7 +79,7 @@ def against_physics(problem: Problem, state: State) -> Iterator[Impossible]:
 
 
 def refuse_impossible(problem: Problem, before: State, after: State, cause: str = "") -> None:
-    """Raise `ImpossibleStateError` if a state is impossible for a reason that doesn't also apply to the previous state.
+    """Raise `ImpossibleStateError` if a state is impossible, unless the previous state is impossible for the same reason.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def _had_twice(problem: Problem, state: State) -> Iterator[Impossible]:
 
 
 def _held_elsewhere(problem: Problem, state: State) -> Iterator[Impossible]:
-    """Yield objects at a place that a hand at another place holds, and objects "in a hand" that no hand holds.
+    """Yield objects at a place although a hand at another place holds them, and objects "in a hand" although no hand holds them.
 
     While a hand grasps or releases an object, the object may be both in the hand and at its place.
     """

@@ -13,9 +13,10 @@ from confab.reasoner.symbols import FALSE, AmountEffect, AnyOf, Behavior, Proble
 def never_done(problem: Problem) -> Iterator[tuple[Behavior, str]]:
     """Yield each relevant behaviour that no plan can contain in any state, with the reason.
 
-    - A behaviour above the lowest level can't be refined if it always has an effect that no behaviour of a lower level can have.
-    - Every refinement and every plan must restore the rest values of symbols. If no behaviour restores a symbol's rest value, no
-      plan contains a behaviour that always changes the symbol from this value.
+    A behaviour above the lowest level can't be refined if it always has an effect that no behaviour of a lower level can have.
+
+    Every refinement and every plan must restore the rest values of symbols. If no behaviour restores a symbol's rest value, no plan
+    contains a behaviour that always changes the symbol from this value.
     """
     domain = problem.domain
     values: dict[str, set[str]] = {}

@@ -123,12 +123,12 @@ def _sought(variable: str, kind: str, conditions: Sequence[Condition], negated: 
 
 
 def _is_subject(mark: str, clause: str) -> bool:
-    """Return whether the individual for which a mark stands is the subject of a clause and doesn't occur elsewhere in it."""
+    """Return whether a placeholder for an individual is the subject of a clause and doesn't occur elsewhere in the clause."""
     return clause.startswith(f"{mark} ") and clause.count(mark) == 1
 
 
 def _relative(mark: str, clause: str) -> str | None:
-    """Return a clause as a relative clause about the individual for which a mark stands, or None if this is impossible."""
+    """Return a clause as a relative clause about the individual that a placeholder denotes, or None if this is impossible."""
     if _is_subject(mark, clause):
         return f"that {clause.removeprefix(f'{mark} ')}"
     if clause.endswith(f" {mark}") and clause.count(mark) == 1 and " and " not in clause:

@@ -89,15 +89,13 @@ class Perceived:
 class SituationType:
     """A property of objects that varies between states; the situation type is also the class of the property's values.
 
-    - `arguments` are the classes of the arguments, and `range` is the class of the values.
-    - A property that isn't functional is `boolean`: the property's value becomes the last argument of the symbol, and the
-      symbol's own value is `TRUE` or `FALSE`.
-    - `level` is the first level on which the symbols exist.
-    - `rest` is the value that a refinement must restore. `default` is the initial value of a symbol for which the scene states no
-      value.
-    - With a `quantity`, the values are numbers (`confab.reasoner.amounts`), and only symbols with a stated amount exist.
-    - `perceived` states how the values are perceived in physics; None for values that aren't perceived.
-    - `properties` are the names of the value properties.
+    `arguments` are the classes of the arguments, and `range` is the class of the values. A property that isn't functional is
+    `boolean`: the property's value becomes the last argument of the symbol, and the symbol's own value is `TRUE` or `FALSE`. With a
+    `quantity`, the values are numbers (`confab.reasoner.amounts`), and only symbols with a stated amount exist.
+
+    `level` is the first level on which the symbols exist. `rest` is the value that a refinement must restore. `default` is the
+    initial value of a symbol for which the scene states no value. `perceived` states how the values are perceived in physics; it is
+    None for values that aren't perceived. `properties` are the names of the value properties.
     """
 
     name: str
@@ -194,7 +192,7 @@ class AnyOf:
     """The condition that at least one alternative (a conjunction) is true; if negated, no alternative is true.
 
     A disjunction doesn't bind variables for conditions outside the disjunction. If the condition is a precondition that enforces
-    a constraint, messages name this `constraint`.
+    a constraint, `constraint` is the constraint, which messages name.
     """
 
     alternatives: tuple[tuple[Condition, ...], ...]
@@ -339,12 +337,12 @@ class Parameter:
 class Behavior:
     """A lifted behaviour (action schema).
 
-    - Effects are applied in order; effects that make facts false come first. As in PDDL, if a behaviour makes a fact both false
-      and true, the fact is true.
-    - A behaviour isn't applicable if it would violate the bounds of an amount.
-    - `price` replaces `cost`; a precondition requires that the price is a number (`priced`).
-    - `spread` contains the individuals that the behaviour mentions only because an effect on all members of a class was expanded.
-    - `timing` states the spans of conditions and effects (`confab.reasoner.timing`).
+    Effects are applied in order; effects that make facts false come first. As in PDDL, if a behaviour makes a fact both false and
+    true, the fact is true. A behaviour isn't applicable if it would violate the bounds of an amount.
+
+    A `price` replaces `cost`; a precondition requires that the price is a number (`priced`). `timing` states the spans of
+    conditions and effects (`confab.reasoner.timing`). If effects on all members of a class were replaced by effects on each member,
+    `spread` contains the individuals that only these effects mention.
     """
 
     name: str
@@ -679,7 +677,7 @@ def substituted(condition: Condition, terms: Mapping[str, str]) -> Condition:
 
 
 def made_of(effect: Effect, one: str) -> Effect:
-    """Return the instance of an effect on all members of a class for one member."""
+    """Return, for an effect on all members of a class, the effect on one of the members."""
     if effect.each is None:
         return effect
     terms = {effect.each.name: one}

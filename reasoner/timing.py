@@ -59,9 +59,9 @@ def projected(
 
 
 def only_during(problem: Problem) -> frozenset[str]:
-    """Return the behaviours that give a symbol a value only during their execution, if this value may be required.
+    """Return the behaviours that give a symbol a required value only during their execution.
 
-    The goal or another behaviour may require the value.
+    The goal or another behaviour may require this value.
 
     A plan that uses a value of this kind needs concurrency: if steps are executed one after another, no other step ever finds the
     value.

@@ -215,6 +215,6 @@ def _steps(timeline: Timeline, labels: Labels, notes: Mapping[tuple[int, ...], s
 
 
 def _measured(step: Step, bar: Bar | None, labels: Labels) -> list[tuple[str, str]]:
-    """Return names and values: the measurements of a primitive, and the variables that the state determines for a step."""
+    """Return pairs of name and value: the measurements of a step, and the variables that the state determines for the step."""
     pairs = [measurement(name, value) for name, value in (bar.measured if bar else {}).items()]
     return [*pairs, *((spaced(name), labels.name(value)) for name, value in step.bindings.items())]

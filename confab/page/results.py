@@ -228,7 +228,7 @@ def again_of(scene: Known, problem: Problem, report: Report | None, execution: E
 
 
 def small_print_of(outcome: Outcome | None) -> list[str]:
-    """Return notes on the levels on which no plan can be refined, and on the conditions of these levels that the plan violates."""
+    """Return notes on the levels on which no plan can be refined, and on the violated conditions of these levels."""
     if outcome is None:
         return []
     broken = [broken.text for left in outcome.left for broken in left.broken]

@@ -142,7 +142,7 @@ class Sheet:
     def _checked(self, key: str, value: object) -> str:
         """Return a value of a symbol; raise `KnowledgeError` if the value is invalid.
 
-        As the value of an amount, any text is accepted here.
+        For an amount, any text is accepted as the value.
         """
         symbol = self.symbols[key]
         situation = self.problem.domain.situations[symbol.situation]

@@ -49,9 +49,9 @@ def compiled(domain: Domain, classes: Mapping[str, Sequence[str]]) -> Domain:
 def _prevented(behavior: Behavior, domain: Domain, classes: Mapping[str, Sequence[str]]) -> Behavior:
     """Return a behaviour with additional preconditions that prevent violations of constraints.
 
-    No constraint is violated before the behaviour, so the behaviour can only add violations. The condition under which the
-    behaviour adds a violation becomes a negated precondition. A durative behaviour gets effects on the number of violations in
-    place of the precondition; the schedule checks the bound of this number.
+    No constraint is violated before the behaviour, so the behaviour can only add violations. The additional precondition is the
+    negation of the condition under which the behaviour adds a violation. A durative behaviour doesn't get this precondition, but
+    effects that count the violations; the schedule checks the bound of the count.
     """
     if behavior.timing is not None or not behavior.changes & domain.constraints.keys():
         return behavior

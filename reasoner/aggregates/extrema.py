@@ -112,7 +112,7 @@ def extrema_replaced(domain: Domain) -> Domain:
     Raises
     ------
     DomainError
-        An effect, a price, a duration or a sum reads a maximum or minimum; the message names the reader and the amount.
+        A maximum or minimum occurs in an effect, a price, a duration or a sum; the message names the place and the amount.
     """
     aggregates = domain.aggregates
     if all(one.kept for one in aggregates.values()):

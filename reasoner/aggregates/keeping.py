@@ -1,20 +1,20 @@
 """Effects by which a behaviour updates a sum or a count.
 
 Soundness: A tuple of individuals contributes to a total if the tuple satisfies the aggregate's conditions. The contribution of a
-tuple can change only if an effect changes a symbol in the aggregate's conditions or in the aggregated number. Consider each pair
-of an effect and a symbol in the aggregate that the effect may change. The *candidates* of a pair of effect and symbol are the
-tuples for which the symbol has the effect's arguments, and the value before or after the effect. If the conditions hold for a
-candidate only after the behaviour (`confab.reasoner.afterwards`), the candidate's number is added to the total. If the conditions
-hold for a candidate only before the behaviour, the candidate's number is subtracted. A tuple that is a candidate of several pairs
-is counted for the first pair only.
+tuple can change only if an effect changes a symbol in the aggregate's conditions or in the aggregated number. Consider each pair of
+an effect and a symbol in the aggregate that the effect may change. A tuple is a *candidate* of such a pair if, for this tuple, the
+aggregate's symbol has the arguments of the effect, and its value before or after the effect. If the conditions hold for a candidate
+only after the behaviour (`confab.reasoner.afterwards`), the candidate's number is added to the total. If the conditions hold for a
+candidate only before the behaviour, the candidate's number is subtracted. A tuple that is a candidate of several pairs is counted
+for the first pair only.
 
 If the aggregated number is linear in the changing amounts (only additions and subtractions), each change of an amount changes the
 total directly. The change is added for every tuple that satisfies the conditions after the behaviour. The changes are independent
 of each other.
 
-If the maximum of a count is 0, no tuple contributes before a behaviour, and a single contributing tuple violates the bound. From
-a count whose maximum is 0, nothing needs to be subtracted, and a tuple may be counted for several pairs. A tuple that only loses
-a value doesn't start to contribute, unless the condition on this value is negated.
+If the maximum of a count is 0, no tuple contributes before a behaviour, and a single contributing tuple violates the bound.
+Therefore, nothing needs to be subtracted from such a count, and a tuple may be counted for several pairs. A tuple for which a
+symbol only loses a value doesn't start to contribute, unless the condition on this value is negated.
 """
 
 from __future__ import annotations
@@ -54,8 +54,8 @@ from confab.reasoner.symbols import (
 )
 
 MOST_CONDITIONS = 5_000
-"""Maximum number of conditions, including nested conditions, of a behaviour that updates derived amounts (one second to
-compile)."""
+"""Maximum number of conditions of a behaviour that updates derived amounts; nested conditions are counted, too. A behaviour with
+this number of conditions is compiled in one second."""
 MOST_COMPARED = 300
 """Maximum number of candidates of a total that are compared with each other; the comparison takes one second."""
 
@@ -71,7 +71,7 @@ def kept(
     Parameters
     ----------
     behavior : Behavior
-        The behaviour, in which an effect on all members of a class is still a single effect.
+        The behaviour, whose effects on all members of a class aren't yet expanded to one effect per member.
     aggregates : iterable of Aggregate
         Aggregates in the order of `in_order`.
     situations : mapping of name to SituationType
@@ -103,7 +103,8 @@ def _timed(
 ) -> Behavior:
     """Return a durative behaviour that changes a total at the same times as the facts on which the total depends.
 
-    The behaviour's effects at the start and at the end change the total separately, each under the conditions of the same time.
+    Effects at the start of the behaviour change the total at the start, under the conditions at the start. The same holds for the
+    end.
     """
     timing = behavior.timing
     assert timing is not None
@@ -126,10 +127,10 @@ def _timed(
 class _Candidate:
     """The tuples whose contribution to a total may be changed by one effect on one symbol of the aggregate.
 
-    `effect` is a copy of the effect with its own variables. `named` are the arguments of the symbol and `value` its value (None
-    for an amount). If `before` is true, the tuples contain the value that the symbol has before the effect, otherwise the value
-    after the effect. If the effect only changes one term of a linear number, `term` is this term; such an effect doesn't start or
-    end a contribution.
+    `effect` is a copy of the effect with its own variables. `named` are the arguments of the symbol and `value` its value (None for
+    an amount). If `before` is true, the tuples contain the value that the symbol has before the effect, otherwise the value after
+    the effect. If the aggregated number is linear and the effect changes only one term of this number, `term` is this term. Such an
+    effect doesn't change which tuples contribute to the total.
     """
 
     effect: Effect
@@ -213,7 +214,7 @@ class _Keeping:
     def _candidate(self, effect: Effect, named: tuple[str, ...], value: str | None, before: bool) -> _Candidate:
         """Return the candidate of an effect and a symbol.
 
-        If a witness binds the member of an effect on each member of a class, the candidate doesn't name the member.
+        For an effect on each member of a class, a witness may bind the member; the candidate then doesn't name the member.
         """
         effect = self.after.apart(effect)
         if effect.each is None:
@@ -287,7 +288,7 @@ class _Keeping:
     ) -> Iterator[tuple[dict[str, str], Parameter | None, list[Formula]]]:
         """Yield tuples with a term for every variable.
 
-        The term for a variable is determined by a condition, is a member of a class, or is each individual in turn.
+        The term for a variable is determined by a condition, or stands for each member of a class, or is each individual in turn.
         """
         found, more = dict(tuple_), list[Formula]()
         determined = True
@@ -318,7 +319,7 @@ class _Keeping:
     def _changes(
         self, effect: Effect, term: Term, tuple_: Mapping[str, str], each: Parameter | None, guard: Sequence[Formula]
     ) -> Iterator[AmountEffect]:
-        """Yield the change of the total that the change of one amount causes, for tuples that contribute after the behaviour."""
+        """Yield the effects on the total of a change of one amount, for tuples that contribute after the behaviour."""
         assert isinstance(effect, AmountEffect)
         amount, operation, scaled = term
         arguments = tuple(tuple_.get(argument, argument) for argument in amount.arguments)

@@ -1,9 +1,9 @@
 """Effects by which a behaviour updates a remembered situation type.
 
-A remembered symbol remembers an original symbol: a behaviour makes the remembered symbol true if the original symbol is true
-after the behaviour. The count of the original symbol's solutions, which is 0 or 1, becomes 1 under the same condition. The
-regression of counts (`confab.reasoner.aggregates.keeping`) therefore also derives the effects on remembered symbols. The count
-has the maximum 0, because the effects on a count with this maximum depend only on the state after the behaviour.
+A remembered symbol remembers an original symbol: a behaviour makes the remembered symbol true if the original symbol is true after
+the behaviour. The original symbol has a count of solutions, which is 0 or 1; this count becomes 1 under the same condition. The
+regression of counts (`confab.reasoner.aggregates.keeping`) therefore also derives the effects on remembered symbols. The count has
+the maximum 0, because the effects on a count with this maximum depend only on the state after the behaviour.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from confab.reasoner.symbols import (
 )
 
 NONE_ALLOWED = Quantity(whole=True, most=Fraction(0))
-"""The properties of the amounts of a count whose maximum is 0."""
+"""The properties of a count that must stay 0: whole numbers with the maximum 0."""
 
 
 def solutions_of(name: str, situation: SituationType, negated: bool = False) -> Aggregate:
@@ -75,7 +75,7 @@ def remembering(behavior: Behavior, count: Aggregate, domain: Domain, classes: M
     Parameters
     ----------
     behavior : Behavior
-        The behaviour with its effects on everything that the remembered situation type depends on.
+        The behaviour, which already updates everything on which the remembered situation type depends.
     count : Aggregate
         The count of the remembered situation type, as `count_of` returns it.
     domain : Domain
@@ -111,7 +111,7 @@ def remembering(behavior: Behavior, count: Aggregate, domain: Domain, classes: M
 def _alone(effect: AmountEffect, classes: Mapping[str, Sequence[str]]) -> Iterator[AmountEffect]:
     """Yield an effect.
 
-    For an effect on each member of a class that isn't an argument of the symbol, yield one effect per member.
+    An effect on each member of a class is replaced by one effect per member, unless the member is an argument of the symbol.
     """
     if effect.each is None or effect.each.name in effect.arguments:
         yield effect

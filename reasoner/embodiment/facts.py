@@ -134,9 +134,10 @@ class BodyFacts:
         return found
 
     def settings(self, general: str, special: str) -> dict[str, float]:
-        """Return the settings of a skill (`general`) for a behaviour (`special`), or of a perceiver for a situation type.
+        """Return the settings of a skill for a behaviour, or the settings of a perceiver for a situation type.
 
-        Numbers that the behaviour or situation type states override numbers of the skill or perceiver; adjustments override both.
+        `general` is the skill or perceiver, and `special` is the behaviour or situation type. The numbers of `special` override the
+        numbers of `general`; adjustments override both.
         """
         settings = self.all_numbers(general) | self.all_numbers(special)
         for node in sorted(node for node, links in self.links.items() if special in links.get("adjusts", ())):

@@ -18,7 +18,7 @@ MEASURED_NUMBERS = {"clear"}
 """Numbers that an expression may name and that are computed when the skill runs."""
 
 WITHOUT_ROLE = {"hand", "supports"}
-"""Words that may replace a role and need no term of the behaviour."""
+"""Words that a phase may contain in place of a role; the behaviour needs no parameter or variable for these words."""
 
 
 def roles_of(use: SkillUse) -> set[str]:

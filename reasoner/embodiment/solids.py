@@ -29,7 +29,7 @@ REFINED = 24
 class Block:
     """A box, cylinder or sphere in the world frame, with its `owner`.
 
-    The half extents of a box, or the radii of a round solid, are in `half`.
+    `half` contains the half extents of a box, or the radii of a round solid.
     """
 
     owner: str
@@ -41,7 +41,7 @@ class Block:
 
     @property
     def name(self) -> str:
-        """The name of the owner, preceded by the name of the solid if the names are different."""
+        """The name of the owner; if the solid has another name, this name precedes the owner's name."""
         return self.owner if self.part in ("", self.owner) else f"{self.part} ({self.owner})"
 
     def extent(self, directions: Array) -> Array:

@@ -23,13 +23,14 @@ Flaw: TypeAlias = tuple[str, str, str, str]
 class Hand:
     """A hand of a robot, with the hand's fingers and the arm that carries the hand.
 
-    - `tip` is the URDF link whose frame, rotated by `turned` (roll, pitch, yaw), is the hand's frame. The x axis of the
-      hand's frame is the direction of the fingers, y leads from finger to finger, and z is up if the hand is upright.
-    - `arm` and `fingers` are joint names; the value of a finger joint increases when the hand opens.
-    - `home` is the rest posture, one angle per arm joint; `opening` is the open position of a finger joint; `grip` is the force of
-      each finger.
-    - `gripper` is a URDF file that is mounted on the arm's link `flange` at `mounting` (x, y, z, roll, pitch, yaw). Names of the
-      gripper's links and joints begin with the hand's name.
+    `tip` is a URDF link. The hand's frame is the frame of this link, rotated by `turned` (roll, pitch, yaw). The x axis of the
+    hand's frame is the direction of the fingers, y leads from finger to finger, and z is up if the hand is upright.
+
+    `arm` and `fingers` are joint names; the value of a finger joint increases when the hand opens. `home` is the rest posture, one
+    angle per arm joint. `opening` is the open position of a finger joint. `grip` is the force of each finger.
+
+    `gripper` is a URDF file that is mounted on the arm's link `flange` at `mounting` (x, y, z, roll, pitch, yaw). Names of the
+    gripper's links and joints begin with the hand's name.
     """
 
     name: str
@@ -134,12 +135,14 @@ class Feature:
 class Link:
     """A link of a mechanism: its solids and features, and the joint that connects it to its parent (the base if empty).
 
-    - `kind` is revolute, prismatic or fixed. `position` and `turned` are the joint's frame in the parent's frame; this
-      frame is the link's frame if the joint value is 0.
-    - The joint counts as open (or switched on) if its value is at least `opened`, and as shut if its value is at most `shut`.
-    - `friction` (newtons or newton metres) and `damping` resist a motion; a `spring` pushes towards 0.
-    - A joint that `latches` stays at `opened` after a push beyond `opened`, until the next push.
-    - `urdf_link` is the link's name in the mechanism's URDF file.
+    `kind` is the kind of the joint: revolute, prismatic or fixed. `position` and `turned` are the joint's frame in the parent's
+    frame. At the joint value 0, the link's frame equals the joint's frame.
+
+    The joint counts as open (or switched on) if its value is at least `opened`, and as shut if its value is at most `shut`.
+    `friction` (newtons or newton metres) and `damping` resist a motion. A `spring` pushes the joint towards 0. A joint that
+    `latches` stays at `opened` after a push beyond `opened`, until the next push.
+
+    `urdf_link` is the link's name in the mechanism's URDF file.
     """
 
     name: str
@@ -236,18 +239,16 @@ class Guard:
 class Phase:
     """One motion of a skill, relative to a feature of an object or link.
 
-    - `motion` is the kind of path: free (planned around all obstacles), line (straight), joint (along the joint's path), or another
-      key of `confab.sim.phases.MOTIONS`.
-    - `to` is the goal, a role with a feature such as ``target.grip``. The hand's tip, or the point that `bring` names,
-      moves to the goal.
-    - `offset` is a shift of the goal in the hand's frame, and `above` is an upward shift.
-    - `offset`, `above`, `value`, `speed` and `wait` are expressions: sums of numbers and settings, such as ``raised-slip``.
-    - `by` is the role of the hand that executes the phase.
-    - `fingers` (open, shut or grasp) states what the fingers do before the hand moves. `touches` contains roles or features that
-      the hand may touch.
-    - The motion ends early if a guard in `until` holds. After the motion, all guards in `checks` must hold.
-    - The phase is executed only if all conditions in `when` hold. A `foreseen` phase isn't executed; its feasibility is checked
-      in advance.
+    `motion` is the kind of path: free (planned around all obstacles), line (straight), joint (along the joint's path), or another
+    key of `confab.sim.phases.MOTIONS`. `to` is the goal, a role with a feature such as ``target.grip``. The hand's tip, or the
+    point that `bring` names, moves to the goal. `offset` is a shift of the goal in the hand's frame. `above` is an upward shift.
+    `offset`, `above`, `value`, `speed` and `wait` are expressions: sums of numbers and settings, such as ``raised-slip``.
+
+    `by` is the role of the hand that executes the phase. `fingers` (open, shut or grasp) states what the fingers do before the hand
+    moves. `touches` contains roles or features that the hand may touch.
+
+    The motion ends early if a guard in `until` holds. After the motion, all guards in `checks` must hold. The phase is executed
+    only if all conditions in `when` hold. A `foreseen` phase isn't executed; its feasibility is checked in advance.
     """
 
     name: str

@@ -1,6 +1,6 @@
 """Safe reading of RDF documents: RDF/XML is passed to the parser without external or recursive entities.
 
-The XML parser expat reads the declaration of the document type, which is then replaced by a declaration with only plain entities.
+The XML parser expat reads the document type declaration; a declaration with only plain entities then replaces this declaration.
 (Protégé 4 abbreviates namespaces by plain entities.) Comments, instructions and other declarations before the first element are
 removed.
 """

@@ -4,8 +4,8 @@ Only static facts are inferred. Facts of situation types are excluded, because b
 ranges of their properties are used. The members of a class that is defined by situations aren't inferred; the class is compiled
 into conditions (`confab.reasoner.reading.definitions`).
 
-Subclasses are read without inference. The reasoner runs only if `needed` finds other axioms that have consequences. The limits of
-RL are listed in docs/inference.md.
+Subclasses are read without inference. The reasoner runs only if `needed` finds axioms, besides subclass axioms, that have
+consequences. The limits of RL are listed in docs/inference.md.
 """
 
 from __future__ import annotations

@@ -323,9 +323,9 @@ def core_names(graph: KnowledgeGraph, query: str) -> str:
 
 
 def unheard_of(graph: KnowledgeGraph, query: str) -> list[str]:
-    """Return the names in a query that the graph lacks although it describes their namespace, each with a correction if known.
+    """Return the unknown names in a query, each with a correction if there is one.
 
-    Names of standard vocabularies are left out.
+    A name is unknown if the graph describes its namespace but lacks the name. Names of standard vocabularies are left out.
     """
     known = {**graph.spoken, **dict(NAMESPACES.findall(query))}
     spaces = {space for space in known.values() if not space.startswith(STANDARDS)}

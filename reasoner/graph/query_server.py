@@ -1,8 +1,8 @@
 """Main program of the process that executes queries for `confab.reasoner.graph.query_process`.
 
 The process imports no other module of this project, stores a graph, and forks a process for each query. The forked process limits
-its own memory, time and number of open files, which also prevents connections, and ends after its answer. The next message, or
-the end of the parent process, stops the forked process.
+its own memory, time and number of open files; because of the last limit, it can't open connections. It ends after its answer. The
+next message, or the end of the parent process, stops the forked process.
 """
 
 from __future__ import annotations

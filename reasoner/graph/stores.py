@@ -1,8 +1,8 @@
 """Stores for a scene's triples besides memory: an Oxigraph store on disk, and any SPARQL 1.1 endpoint.
 
-A store on disk is filled from the files when it is created, and again after a file has changed. An endpoint is only read, by a
-few large queries. An endpoint contains all triples in one default graph, or a named graph for each ontology with the ontology's
-IRI.
+A store on disk is filled from the files when it is created, and again after a file has changed. An endpoint is only read, by a few
+large queries. An endpoint contains either all triples in one default graph, or a named graph for each ontology. The name of such a
+graph is the ontology's IRI.
 """
 
 from __future__ import annotations
@@ -236,7 +236,7 @@ def connect(url: str, scene: str | None = None, *, timeout: float = TIMEOUT, ret
     Raises
     ------
     KnowledgeError
-        A query fails as in `Endpoint.query`, the endpoint doesn't contain the given scene, or no scene is given and the endpoint
+        A query fails as in `Endpoint.query`, or the endpoint doesn't contain the given scene. If no scene is given, the endpoint
         contains no scene or several scenes.
     """
     endpoint = Endpoint(url, os.environ.get(AUTHORIZATION), timeout, retries)

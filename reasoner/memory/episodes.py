@@ -121,7 +121,10 @@ def triples_of(episode: Data, names: Names, name: str = "episode") -> Iterator[o
 
 
 def _phases(describe: _Describe, whole: ox.NamedNode, episode: Data) -> Iterator[ox.Triple]:
-    """Yield a phase for each value of each symbol; a boolean symbol with several arguments has phases only for the value true."""
+    """Yield a phase for each value of each symbol.
+
+    A boolean symbol with several arguments has phases only for the value true.
+    """
     end = float(episode["seconds"].get("simulated", 0.0))
     values: dict[tuple[str, ...], tuple[str, float]] = {}
     found: list[tuple[tuple[str, ...], str, float, float]] = []

@@ -10,12 +10,11 @@ Measured    durations of a behaviour: number of executions, mean and spread
 Experience  all learned items, with grow-only tallies by replica and epoch, which can be merged
 ==========  ===================================================================================================
 
-Rules, orders, methods and kinds of goals are named by a hash of their content. Because of these names, equal items of two
-replicas have equal names, and a union of the replicas merges equal items. An item has one tally per lifted fact (`Fact`). The
-tally of the empty fact counts all uses of the item; the tally of another fact counts only uses in which the individuals in the
-item's roles satisfied the fact. The weight of tallies of epoch 0 never decays. Each further epoch belongs to one episode of a
-replica. The tallies of a further epoch are preferences between individuals, for example between two hands; their weight decays
-with every later episode.
+Rules, orders, methods and kinds of goals are named by a hash of their content. Equal items therefore have equal names in all
+replicas, and a union of replicas merges equal items. An item has one tally per lifted fact (`Fact`). The tally of the empty fact
+counts all uses of the item; the tally of another fact counts only uses in which the individuals in the item's roles satisfied the
+fact. The weight of tallies of epoch 0 never decays. Each further epoch belongs to one episode of a replica. The tallies of a
+further epoch are preferences between individuals, for example between two hands; their weight decays with every later episode.
 """
 
 from __future__ import annotations
@@ -32,8 +31,8 @@ from confab.reasoner.symbols import Fact as Goal
 Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
 """A behaviour and its arguments."""
 Fact: TypeAlias = "tuple[str, str]"
-"""A question about the individuals in the roles of an item, and the answer. For the tally of all uses of an item, question and
-answer are empty texts.
+"""A question about the individuals in the roles of an item, and the answer. For the tally of all uses of an item, both the question
+and the answer are the empty text.
 """
 ITSELF: Fact = ("", "")
 
@@ -99,7 +98,10 @@ class Order:
 
     @classmethod
     def of(cls, first: Goal, then: Goal, constants: frozenset[str]) -> Order:
-        """Return the learned order of two goals. Shared individuals are noted by their positions, except `constants`."""
+        """Return the learned order of two goals.
+
+        The order records the positions of the individuals that both goals contain, except `constants`.
+        """
         one, other = (*first.symbol.arguments, first.value), (*then.symbol.arguments, then.value)
         shared = [(i, j) for i, a in enumerate(one) for j, b in enumerate(other) if a == b and a not in constants]
         return cls(first.symbol.situation, then.symbol.situation, tuple(shared))
@@ -114,9 +116,10 @@ class Order:
 class OpenRole:
     """A role of a method that isn't a parameter of the refined behaviour.
 
-    `kind` is the class of the parameter that the role fills. `source` is the symbol whose value fills the role at the role's
-    first use: the situation type, and the roles that are the symbol's arguments. If the individual becomes the value of a symbol,
-    `becomes` is the symbol's situation type; individuals that aren't the value of another symbol are then preferred.
+    `kind` is the class of the parameter that the role fills. `source` is a symbol whose value fills the role when a step first uses
+    the role. The symbol is given by its situation type, and by the roles that are its arguments. If a step makes the individual in
+    the role the value of a symbol, `becomes` is the symbol's situation type. Individuals that aren't yet the value of such a symbol
+    are then preferred.
     """
 
     kind: str
@@ -164,11 +167,11 @@ class Tally:
     failed: int = 0
 
     def __add__(self, other: Tally) -> Tally:
-        """Return the sums of the numbers, for tallies of different events."""
+        """Return the sum of two tallies, which count different events."""
         return Tally(self.chosen + other.chosen, self.passed_over + other.passed_over, self.failed + other.failed)
 
     def __or__(self, other: Tally) -> Tally:
-        """Return the maxima of the numbers, for two copies of one tally."""
+        """Return the union of two copies of one tally, which has the greater of each pair of numbers."""
         return Tally(
             max(self.chosen, other.chosen), max(self.passed_over, other.passed_over), max(self.failed, other.failed)
         )

@@ -150,7 +150,7 @@ def turtle(
 ) -> Iterator[str]:
     """Yield a memory as Turtle, item by item.
 
-    With `only`, the text has the tallies of one replica; `words` returns the label of an item.
+    If `only` is given, the text contains only the tallies of this replica. The function `words` returns the label of an item.
     """
     iri = _node("urn:uuid:", experience.replica)
     prefixes = {"core": CORE, "owl": OWL, "rdfs": RDFS, "space": MEMORY}

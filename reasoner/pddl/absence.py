@@ -13,8 +13,8 @@ class Kept:
     """The extra predicates that an export declares for the negative preconditions of its behaviours.
 
     `contrary` maps a situation type to the values for which the export needs a predicate ``not_TYPE`` of an individual and the
-    value. `free` maps a class and a situation type to the values for which a predicate ``no_CLASS_has_TYPE`` of the value
-    suffices, because at most one individual can have the value.
+    value. `free` maps a class and a situation type to the values that at most one individual can have at a time. For these values,
+    a predicate ``no_CLASS_has_TYPE`` of the value suffices.
     """
 
     def __init__(self, problem: Problem, behaviors: Sequence[Behavior], words: Vocabulary) -> None:

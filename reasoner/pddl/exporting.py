@@ -47,8 +47,8 @@ LINE = "\n    "
 class Exported:
     """An exported PDDL domain and problem, with the mapping from PDDL names to the names of the scene.
 
-    `actions` maps the name of an action to its behaviour and to the position of each of the behaviour's parameters among the
-    action's parameters. `objects` maps the name of an object to its individual.
+    `actions` maps the name of an action to its behaviour, and to the positions of the behaviour's parameters in the action's list
+    of parameters. `objects` maps the name of an object to its individual.
     """
 
     domain: str
@@ -73,7 +73,7 @@ def to_pddl(
     Raises
     ------
     KnowledgeError
-        Another behaviour or the goal may require a value that a behaviour gives a symbol only during its execution.
+        A behaviour gives a symbol a value only during its execution, and the goal or another behaviour may require this value.
     """
     if names := sorted(only_during(problem)):
         raise KnowledgeError(

@@ -186,7 +186,7 @@ def _changes(form: Form | None, when: tuple[Form, ...] = (), variables: tuple[Ty
 
 
 def functions_read(form: Form | None) -> Iterator[str]:
-    """Yield the first word of each list inside a form, except the function that a numeric effect changes."""
+    """Yield the functions that a form reads (the first words of its lists), without the function that a numeric effect changes."""
     if form is None:
         return
     for item in form.items[2 if form.head in CHANGES else 0 :]:

@@ -87,7 +87,7 @@ BASE = "https://w3id.org/confab/pddl/"
 class Place:
     """The translation of a predicate: its situation type, the positions of the object and the value, and possibly a fixed value.
 
-    The fixed value is used for a predicate of which no argument is the value.
+    A predicate has a fixed value if none of its arguments is the value.
     """
 
     situation: str
@@ -577,7 +577,10 @@ class _Import:
     def value_effects(
         self, effects: Sequence[Effect], variables: Variables, conditions: Sequence[Condition]
     ) -> tuple[ValueEffect, ...]:
-        """Return the effects of an action on values. Effects that end values come before effects that give values."""
+        """Return the effects of an action on values.
+
+        Effects that take a value from a symbol come before effects that give a value.
+        """
         ends: list[ValueEffect] = []
         begins: list[ValueEffect] = []
         for effect, named in ((e, n) for e in effects for n in self.instances(e)):
@@ -607,7 +610,7 @@ class _Import:
         yield from (dict(zip(names, row, strict=True)) for row in product(*things))
 
     def replaced(self, end: Effect, effects: Sequence[Effect]) -> bool:
-        """Return whether an effect that ends a symbol's value is redundant, because another effect gives a new value."""
+        """Return whether an effect that takes a value from a symbol is redundant, because another effect gives a new value."""
         symbol = replace(self.atom(end.atom), value="")
         return any(
             e.true and e.atom[0] in self.places and replace(self.atom(e.atom), value="") == symbol

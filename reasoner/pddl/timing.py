@@ -95,11 +95,11 @@ def timing(table: Table, parts: Durative, variables: Variables, conditions: Sequ
 
 
 def snapped(pddl: Pddl, effects: Mapping[str, Sequence[Effect]]) -> tuple[Pddl, dict[str, tuple[Effect, ...]]]:
-    """Return a domain in which a start action and an end action replace each durative action, and the effects of all actions.
+    """Return a domain with a start action and an end action for each durative action; also return the effects of all actions.
 
     Invariant synthesis works on the returned domain. The synthesis recognises a deletion only if the same action requires the
-    deleted fact. If the start of an action adds no fact, its deletions and their conditions are moved to the end, which may add
-    another fact in place of a deleted fact.
+    deleted fact. If the start of an action adds no fact, its deletions and their conditions are moved to the end of the action. The
+    end may then add a fact in place of a deleted fact.
     """
     actions: dict[str, Action] = {}
     found: dict[str, tuple[Effect, ...]] = {}

@@ -58,7 +58,7 @@ RELATION_PROPERTIES = (
 TYPE = ox.NamedNode(RDF + "type")
 SIGNS = {"increase": "+", "decrease": "-", "scale": "*"}
 MOST_TOGETHER = 3
-"""The query tests the bounds of an amount only if at most this many other effects change the same amount."""
+"""Maximum number of other effects on an amount. If a behaviour has more, the query doesn't test the bounds of the amount."""
 
 
 @dataclass(frozen=True, order=True)
@@ -195,8 +195,8 @@ def _fact(said: ValueCondition | ValueEffect, bindings: dict[str, str]) -> Fact:
 def allowed_together(behavior: Behavior, situations: Mapping[str, SituationType]) -> Iterator[Condition]:
     """Yield the preconditions that keep amounts within their bounds if several effects of a behaviour change the same amount.
 
-    The arguments of two effects may denote the same symbol or different symbols; each combination of these cases has its own
-    condition.
+    Whether two effects change the same symbol depends on their arguments. Each combination of equal and different arguments has its
+    own condition.
     """
     for effect in behavior.amounts:
         quantity = situations[effect.situation].quantity

@@ -1,8 +1,8 @@
 """Compilation of classes that are defined by situations into conditions.
 
 The members of a class such as "a full vessel is a vessel that carries some beverage" change during a plan. The OWL reasoner must
-not infer members that change during a plan. In a behaviour, the conditions of its definition replace a class that is defined by
-situations:
+not infer members that change during a plan. In a behaviour, a class that is defined by situations is replaced by the conditions of
+its definition:
 
 =========================================  =======================================================
 in OWL                                      in `confab.reasoner.symbols`
@@ -232,9 +232,9 @@ class Definitions:
         return (_negation(found),) if negated else found
 
     def holding(self, term: str, iri: str) -> tuple[Condition, ...]:
-        """Return the conditions for membership in a class, for a situation type that is true for the members.
+        """Return the conditions under which a term is a member of a class, for the rule of a situation type with the same meaning.
 
-        The rules of the situation type itself aren't used.
+        The rules of this situation type itself aren't used.
         """
         if iri not in self.concluded:
             return self.conditions(term, iri)
@@ -263,7 +263,7 @@ class Definitions:
         """Return the rules that follow from the axioms about a value property: subproperties, chains, inverses and characteristics.
 
         The rule of a transitive property adds one link at a time to the pairs that the other rules derive. `more` states whether
-        the situation type has rules that don't follow from axioms.
+        the situation type has rules besides the rules from axioms.
         """
         said = self.nodes.get(prop, {})
         chains: list[tuple[str, ...]] = [(other,) for other in self._below(prop)]
@@ -321,7 +321,7 @@ class Definitions:
         return Rule(situation, (Parameter("?from", kinds[0]), Parameter("?to", kinds[1])), variables, conditions)
 
     def _between(self, one: str, other: str) -> str:
-        """Return the class of the individuals between two properties of a chain: values of the first, subjects of the second."""
+        """Return the class of the individuals that are values of one property of a chain and subjects of the next property."""
         for prop, at_its_end in ((one, True), (other, False)):
             iri, inverse = self._named(prop)
             if kind := self.kinds.get(iri, ("", ""))[at_its_end is not inverse]:
@@ -454,7 +454,7 @@ class Definitions:
     def _some(
         self, prop: str, term: str, filler: str, outside: bool, others: int = 0, before: tuple[str, ...] = ()
     ) -> Witness:
-        """Return the condition that a term has a value in a class, and `others` further values in the class, all different.
+        """Return the condition that a term has `others` + 1 different values in a class.
 
         If `outside` is true, return the condition that no value of the term is outside the class.
         """

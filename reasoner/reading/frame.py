@@ -75,7 +75,7 @@ class Frame:
 
     `properties` maps the IRI of a value property to its situation type, and to whether an individual may have several values. In
     `domain`, maxima and minima have been replaced in all conditions, but behaviours don't yet update sums and counts. `lifted`
-    contains the behaviours in which an effect on all members of a class is still a single effect.
+    contains the behaviours whose effects on all members of a class aren't yet expanded to one effect per member.
     """
 
     schema: Schema
@@ -100,9 +100,9 @@ def frame(
 ) -> Frame:
     """Return the domain that a schema describes, together with the classes of some individuals.
 
-    `namesakes` are the IRIs of individuals that weren't read but have the same local names; short names are therefore unique in
-    the whole scene. `earlier` is a frame of fewer individuals; the behaviours of this frame are reused unless a name in a
-    behaviour has changed.
+    `namesakes` are the IRIs of individuals that weren't read, but have the same local names as individuals that were read; short
+    names differ from these, too. `earlier` is a frame of fewer individuals; the behaviours of this frame are reused unless a name
+    in a behaviour has changed.
     """
     nodes, supers = schema.nodes, schema.supers
     instances = [(individual, kind, index) for individual, kind, index in members if individual not in nodes]
@@ -168,7 +168,9 @@ def names_of(schema: Schema, members: Iterable[Member], namesakes: Iterable[str]
 
 
 def _rules(parts: Parts, schema: Schema, situations: Mapping[str, SituationType]) -> dict[str, tuple[Rule, ...]]:
-    """Return the rules of each derived situation type: from rules, from a class, or from axioms about its value property.
+    """Return the rules of each derived situation type.
+
+    A rule is stated, or follows from a class definition or from an axiom about the value property.
 
     Raises
     ------

@@ -238,7 +238,8 @@ def with_derived_goal(problem: Problem, task: str, name: str, wanted: Condition)
 def _wanted_value(iri: str, symbol: Symbol, wanted: ValueCondition, problem: Problem) -> str:
     """Return the wanted value of a goal.
 
-    The wanted value of a negated goal is the only other value of the symbol on the lowest level that has the symbol.
+    The wanted value of a negated goal is the symbol's only other value. The values are counted on the lowest level that has the
+    symbol and the excluded value.
 
     Raises
     ------

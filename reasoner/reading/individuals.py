@@ -28,7 +28,8 @@ class Individuals:
     Attributes
     ----------
     triples : ordered set of triples
-        All facts about the individuals in `seen`, and those facts about other individuals that were found through their values.
+        All facts about the individuals in `seen`, and some facts about other individuals: the facts that a query for their values
+        has found.
     seen : set of individuals
     """
 
@@ -46,7 +47,10 @@ class Individuals:
     def visit(
         self, individuals: set[str], back: Mapping[str, set[str]] | None = None, classes: Iterable[str] = ()
     ) -> list[Triple]:
-        """Read and return the triples about individuals, members of classes, and subjects with property values in `back`."""
+        """Read and return triples about individuals, about members of classes, and about subjects of property values.
+
+        The keys of `back` are properties, and its values are the individuals that are the values of these properties.
+        """
         parts = [f"{{ VALUES ?s {{ {values_of(individuals)} }} ?s ?p ?o }}"] if individuals else []
         for name, targets in (back or {}).items():
             if not targets:

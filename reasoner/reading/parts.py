@@ -167,7 +167,7 @@ class Parts(NodeReader):
         return found
 
     def classes_in(self, iri: str) -> list[str]:
-        """Return the arguments and the value of a node that are classes and stand for all members of the class."""
+        """Return the classes that are arguments or the value of a node and stand for all of their members."""
         said = [value for name in (*ARGUMENTS, "value") for value in self.values(iri, name)[:1]]
         found = [value for value in said if value in self.individuals_of and value not in self.standing]
         if twice := [kind for kind in found if found.count(kind) > 1]:
@@ -291,7 +291,7 @@ class Parts(NodeReader):
         return self.seconds(iri, "duration")
 
     def seconds(self, iri: str, name: str) -> Fraction | None:
-        """Return the value of a property, which is a duration, in seconds; return None if the property has no value."""
+        """Return the duration in seconds that a property states; return None if the property has no value."""
         if not self.values(iri, name):
             return None
         found = seconds_of(self.one(iri, name))

@@ -4,12 +4,13 @@ The set of selected individuals, the *slice*, is closed: if a behaviour can chan
 all individuals in the behaviour's conditions and other effects. Planning in the slice therefore gives the same result as planning
 in the whole world (proof: docs/quantification.md; tests: test_recognition.py, test_closure.py). Recognition has two steps:
 
-1. `routes` reads only the behaviours. For each behaviour that can change a symbol, the function finds routes (chains of
-   properties in the graph) from the symbol's object to the other terms of the behaviour. A route goes forward to a value (the
-   place of the object), along a static relation (a hand that reaches the place), or backward from a value (other objects at the
-   place). If no route leads to a term, the slice contains all individuals of the term's class.
-2. `recognise` follows the routes in the graph from the individuals of the goal. Each query follows the routes by one property,
-   until a query finds no new individual. If the task has no plan in the slice, it then has no plan in the world.
+First, `routes` reads only the behaviours. For each behaviour that can change a symbol, the function finds routes (chains of
+properties in the graph) from the symbol's object to the other terms of the behaviour. A route goes forward to a value (the place of
+the object), along a static relation (a hand that reaches the place), or backward from a value (other objects at the place). If no
+route leads to a term, the slice contains all individuals of the term's class.
+
+Then `recognise` follows the routes in the graph from the individuals of the goal. Each query follows the routes by one property,
+until a query finds no new individual. If the task has no plan in the complete slice, it has no plan in the world.
 """
 
 from __future__ import annotations
@@ -51,8 +52,8 @@ from confab.reasoner.symbols import (
 from confab.reasoner.vocabulary import CORE, PREFIXES, TYPE
 
 ROUNDS = 6
-"""Maximum number of queries that follow the routes by one property each; then one query with a property path completes the
-slice.
+"""Maximum number of queries that follow the routes by one property each. If the last query still finds new
+individuals, one query with a property path completes the slice.
 """
 FREE, RELATION, BACKWARD, FROM_CONSTANT = range(4)  # costs of steps; the cheapest step to a term is chosen
 
@@ -61,11 +62,10 @@ FREE, RELATION, BACKWARD, FROM_CONSTANT = range(4)  # costs of steps; the cheape
 class Routes:
     """The properties (as IRIs) by which task recognition gets from relevant individuals to further relevant individuals.
 
-    - `forward` contains the properties that are followed from subject to object.
-    - The keys of `backward` are the properties that are followed from object to subject. The values are constants: a property is
-      followed from these constants, too. A constant is a value that a behaviour names, such as "nothing"; many symbols may have
-      this value.
-    - `classes` contains the classes whose individuals are all relevant.
+    `forward` contains the properties that are followed from subject to object. The keys of `backward` are the properties that are
+    followed from object to subject, and the values are constants from which the property is followed, too. A constant is a value
+    that a behaviour names, such as "nothing"; many symbols may have this value. `classes` contains the classes whose individuals
+    are all relevant.
     """
 
     forward: set[str] = field(default_factory=set)
@@ -127,10 +127,10 @@ def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
 def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
     """Return the routes from a goal's individuals to all individuals that relevant behaviours can involve or change.
 
-    A behaviour is relevant if it changes a relevant situation type; a rule is relevant if it derives a relevant situation type.
-    All situation types in conditions and effects of relevant behaviours and rules are relevant. If facts of a situation type are
-    looked up by one of their terms, such as a place, an effect on such a fact may concern the slice. In this case, routes also
-    lead from the effect's term at this position to the other terms of the behaviour.
+    A behaviour is relevant if it changes a relevant situation type; a rule is relevant if it derives a relevant situation type. All
+    situation types in conditions and effects of relevant behaviours and rules are relevant. Facts of a situation type may be looked
+    up by one of their terms, such as a place; an effect on such a fact may then concern the slice. In this case, routes also lead
+    from the effect's term at this position to the other terms of the behaviour.
 
     Parameters
     ----------
@@ -193,8 +193,8 @@ class _Doing:
     situations : set of str
         The situation types in the conditions and effects of the behaviour.
     step : set of str
-        The parameters, the variables in positive conditions, and the variables in `always`. (For a total, `always` has the
-        variables that occur in no condition, since the total depends on their individuals, too.)
+        The parameters, the variables in positive conditions, and the variables in `always`. For a total, `always` has the variables
+        that occur in no condition, since the total depends on the individuals of these variables, too.
     """
 
     def __init__(self, behavior: Behavior, always: Collection[str] = ()) -> None:
@@ -308,8 +308,8 @@ def _span(scope: _Scope, start: set[str], more: set[str], known: Frame, found: R
 class _Step:
     """A route from one term of a condition to another term: the properties that the route follows, and its cost.
 
-    `constants` are the individuals that the source may denote. `looks_up` is the situation type with the source's position among
-    the arguments; it is None if the source alone determines the symbol.
+    `constants` are the individuals that the source may denote. If the source alone determines the symbol, `looks_up` is None;
+    otherwise, `looks_up` has the situation type, and the source's position among the arguments.
     """
 
     source: str
@@ -441,8 +441,8 @@ def _namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member])
 
     Only known namespaces are searched.
 
-    The candidates are looked up by their whole IRIs. An individual is included only if a class of the individual is stated. A
-    class is included only if it has individuals that don't belong to the description of behaviours.
+    The candidates are looked up by their whole IRIs. An individual is included only if a class of the individual is stated. A class
+    is included only if it has individuals besides the nodes that describe behaviours.
     """
     terms = {iri for individual, kind, _ in members for iri in (individual, kind)} - schema.nodes.keys()
     endings = {local_name(iri) for iri in terms}

@@ -57,15 +57,13 @@ Member = tuple[str, str, int]
 class Schema:
     """The part of an ontology that doesn't depend on individuals: the rows of `SCHEMA`, as IRIs.
 
-    - `nodes` contains situation types, behaviours with their parts, relations and tasks.
-    - `pairs` contains the situation types whose value property isn't functional.
-    - `whole` contains the amounts whose value property has the range of whole numbers.
-    - `tuples` tells whether some facts are nodes; `facts` contains the facts without arguments.
-    - `expressions` contains the definitions of classes, `axioms` contains the axioms about value properties, and `swrl`
-      contains the SWRL rules.
-    - `ontologies` contains the IRIs of the loaded files.
-    - `exclusive` contains the situation types whose values are exclusive: in physics, only one individual at a time can have a
-      given value.
+    `nodes` contains situation types, behaviours with their parts, relations and tasks. `pairs` contains the situation types whose
+    value property isn't functional. `whole` contains the amounts whose value property has the range of whole numbers. `exclusive`
+    contains the situation types with exclusive values: in physics, only one individual at a time can have a given value.
+
+    `tuples` tells whether some facts are nodes. `facts` contains the facts without arguments. `expressions` contains the
+    definitions of classes. `axioms` contains the axioms about value properties. `swrl` contains the SWRL rules. `ontologies`
+    contains the IRIs of the loaded files.
     """
 
     nodes: Mapping[str, Node]

@@ -1,4 +1,4 @@
-"""A part of a scene that grows by the individuals that a check looks up, independently of the routes of task recognition.
+"""A part of a scene that grows with the lookups of a check, independently of the routes of task recognition.
 
 A checker looks up the members of a class that initially satisfy conditions. One query finds the individuals for all lookups, and
 their values are read. The lookups are repeated until no new individual is found.
@@ -84,7 +84,7 @@ class Surroundings:
 
     @property
     def lifted(self) -> Mapping[str, Behavior]:
-        """The behaviours, in which an effect on all members of a class is still a single effect."""
+        """The behaviours, whose effects on all members of a class aren't yet expanded to one effect per member."""
         return self.frame.lifted
 
     def problem(self) -> Problem:
@@ -136,7 +136,7 @@ class Surroundings:
             yield name, tuple(None if t == variable else iri(t) for t in terms)
 
     def _pattern(self, shape: Shape, rows: Iterable[tuple[str, ...]]) -> str:
-        """Return a pattern that binds ``?x`` to the individuals whose stated facts match a shape, for each row of known terms."""
+        """Return a pattern that binds ``?x`` to the individuals that a lookup finds for each row of known terms."""
         number, parts = 0, []
         at = "|".join(f"<{place}>" for place in PLACES)
         for i, (name, places) in enumerate(shape):

@@ -13,8 +13,8 @@ further class atoms of ``?x``                `ClassCondition`, or the conditions
 ``greaterThan(?w, 5)``, ``add(?s, ?w, 1)``   `Comparison`, `Calculation`
 ===========================================  ==================================================================
 
-If a variable occurs only in the body, a functional value property determines the variable, or the variable becomes that of a
-`Witness`. Rules are DL-safe: variables denote only named individuals of the scene.
+A variable that occurs only in the body is determined by a functional value property or bound by a `Witness`. Rules are DL-safe:
+variables denote only named individuals of the scene.
 """
 
 from __future__ import annotations

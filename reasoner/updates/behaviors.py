@@ -178,7 +178,7 @@ class UpdateCompiler:
             self.effect(one, when, known, negated=False)
 
     def changes(self, one: Triple) -> None:
-        """Raise `UpdateError` unless the predicate of a triple is a situation type, or a value property of one."""
+        """Raise `UpdateError` unless the predicate of a triple is a situation type or the value property of a situation type."""
         prop = "" if one.predicate == A else self.scope.iri(one.predicate)
         if prop and prop not in self.scope.vocabulary.relations:
             return

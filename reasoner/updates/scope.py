@@ -21,9 +21,9 @@ from confab.reasoner.vocabulary import CORE, INDIVIDUAL, TYPE
 class Group:
     """The parts of a group graph pattern, without the patterns that only introduce variables.
 
-    - `chosen` maps each variable that a type pattern introduces to its class.
-    - `determined` maps each variable that a value condition introduces to its class (or situation type) and its position.
-    - `numbers` maps each variable that denotes a number to the triple or BIND expression that gives the number.
+    `chosen` maps each variable that a type pattern introduces to its class. `determined` maps each variable that a value condition
+    introduces to its class (or situation type) and its position. `numbers` maps each variable that denotes a number to the triple
+    or BIND expression that gives the number.
     """
 
     parts: list[Any] = field(default_factory=list)

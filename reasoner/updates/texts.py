@@ -58,10 +58,9 @@ class Update:
 class Vocabulary:
     """The IRIs of situation types, relations and properties that an update can use.
 
-    - `properties` maps a value property to its situation type.
-    - `functional` contains the value properties with one value at a time.
-    - `bare` contains the situation types without a value property; an update uses their IRIs as predicates.
-    - `amounts` and `measures` contain the situation types and the relations whose values are numbers.
+    `properties` maps a value property to its situation type. `functional` contains the value properties with one value at a time.
+    `bare` contains the situation types without a value property; an update uses their IRIs as predicates. `amounts` contains the
+    situation types whose values are numbers. `measures` contains the relations whose values are numbers.
     """
 
     properties: Mapping[str, str]

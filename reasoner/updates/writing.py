@@ -294,7 +294,7 @@ class _Writer:
     def asked_of_class(self, term: str) -> bool:
         """Return whether a class condition on a term exists.
 
-        Without a type pattern for the term, the condition would be read as the type of the term.
+        If the term has no type pattern, the compilation would read such a condition as the type of the term.
         """
         return any(
             isinstance(inner, ClassCondition) and inner.term == term
@@ -316,7 +316,7 @@ def _flat(conditions: Iterable[tuple[Condition, str]]) -> Iterator[tuple[Conditi
 def _choice(alternatives: Sequence[Sequence[Condition]]) -> tuple[str, list[str]] | None:
     """Return the variable and the individuals of a disjunction.
 
-    Return None for a disjunction that doesn't just enumerate the individuals of one variable.
+    Return None unless the disjunction just states that a variable denotes one of several individuals.
     """
     found: list[str] = []
     name = ""

@@ -83,7 +83,7 @@ def _undetermined(conditions: Sequence[Condition], bound: set[str]) -> set[str]:
 
 
 def other_kinds_in_when(case: Case) -> Iterator[Fault]:
-    """Find effects on all members of a class with a condition `when` on all members of another class.
+    """Find effects on all members of one class whose conditions `when` concern all members of another class.
 
     Only classes that have common members are reported.
     """
@@ -270,7 +270,7 @@ def gaps_of_values(case: Case) -> Iterator[Fault]:
 
 
 def crowded_places(case: Case) -> Iterator[Fault]:
-    """Find individuals that share an initial value, although every behaviour that gives the value requires a free value."""
+    """Find individuals that initially share a value, although behaviours give the value only if no individual has it."""
     if case.reading is None:
         return
     problem, names = case.reading.problem, case.reading.names
@@ -303,7 +303,7 @@ def crowded_places(case: Case) -> Iterator[Fault]:
 
 
 def _none_has(condition: Condition, effect: ValueEffect) -> str:
-    """Return the class of which no member has an effect's value according to a condition, or an empty text."""
+    """Return the class in a condition "no member of the class has the effect's value", or an empty text for other conditions."""
     match condition:
         case Witness(variable, kind, (ValueCondition(situation, (about,), value, False),), True):
             same = (situation, about, value) == (effect.situation, variable, effect.value)

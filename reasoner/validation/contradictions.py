@@ -179,7 +179,7 @@ def _plain(condition: Condition) -> str:
 
 @dataclass(frozen=True)
 class _Inner:
-    """A class condition that is inside a negated condition and concerns a term that is bound outside."""
+    """A class condition inside a negated condition, on a term that is bound outside the negated condition."""
 
     term: str
     kind: str

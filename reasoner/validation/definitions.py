@@ -207,7 +207,7 @@ NOT_ENFORCED = {
 
 
 def axioms_not_watched(case: Case) -> Iterator[Fault]:
-    """Find axioms that planning ignores: restrictions of every state, and classifications of individuals without a definition."""
+    """Find axioms that planning ignores: axioms that restrict every state, and subclass axioms that no definition implies."""
     if case.reading is None:
         return
     known = case.reading.schema.expressions

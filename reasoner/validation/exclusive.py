@@ -1,14 +1,14 @@
-"""Validation rule on exclusive values: no behaviour may give a second individual a value that physically has only one holder.
+"""Validation rule on exclusive values: no behaviour may give an exclusive value to a second individual.
 
 The ontology declares exclusive values by ``e:exclusive`` of a perceiver, for example that at most one hand holds an
-object. A behaviour that gives an exclusive value to an individual must ensure in one of three alternatives that no other
+object. A behaviour that gives an exclusive value to an individual must ensure, by one of three alternatives, that no other
 individual has the value. Each level is checked separately.
 
 - *free*: The preconditions require that no individual has the value.
 - *handed over*: The same behaviour takes the value from the individual that has the value.
-- *taken*: The value is an object, and the same behaviour ends a state of this object in which no individual has the value.
-  (Example: a cup at a place is in no hand. The behaviour that gives the cup to a hand also takes the cup from its place, and each
-  behaviour that brings a cup to a place takes the cup from a hand.)
+- *taken*: The value is an object in a state in which no individual has the object, and the same behaviour ends this state. For
+  example, a cup at a place is in no hand. The behaviour that gives the cup to a hand also takes the cup from its place, and each
+  behaviour that brings a cup to a place takes the cup from a hand.
 """
 
 from __future__ import annotations
@@ -55,7 +55,10 @@ def values_not_kept_exclusive(case: Case) -> Iterator[Fault]:
 
 @dataclass(frozen=True)
 class _Taken:
-    """A state in which a value has no holder: the value's `situation` is a member of `kind`, or equals `value`."""
+    """A state of an object in which no individual has the object as its value, such as a cup at a place.
+
+    In this state, the symbol of type `situation` of the object has a value in the class `kind`, or the value `value`.
+    """
 
     situation: str
     kind: str
@@ -165,7 +168,7 @@ class _Exclusive:
         )
 
     def taken(self, behavior: Behavior, effect: ValueEffect) -> Iterator[_Taken]:
-        """Yield the states of an effect's value that end by the same behaviour."""
+        """Yield the states of an effect's value (`_Taken`) that the behaviour ends."""
         for condition in (*behavior.preconditions, *effect.when):
             match condition:
                 case ValueCondition(situation, (about,), before, False) if about == effect.value:
@@ -176,7 +179,7 @@ class _Exclusive:
                     pass
 
     def leaves(self, excluding: _Taken, behavior: Behavior, effect: ValueEffect) -> bool:
-        """Return whether an effect's value has the state `excluding` before the behaviour and not after the behaviour."""
+        """Return whether an effect's value is in the state `excluding` before the behaviour and not after the behaviour."""
         value = effect.value
         before = any(
             isinstance(c, ValueCondition)
@@ -192,7 +195,7 @@ class _Exclusive:
         )
 
     def breaking(self, excluding: _Taken, behaviors: Sequence[Behavior]) -> Iterator[tuple[Behavior, str]]:
-        """Yield the behaviours, with their effect in words, after which a value in the state `excluding` may have a holder."""
+        """Yield behaviours after which an individual may have a value in the state `excluding`, each with its effect in words."""
         for behavior in behaviors:
             for effect in self.given(behavior):
                 if not self.handed_over(behavior, effect) and not self.leaves(excluding, behavior, effect):

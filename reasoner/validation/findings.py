@@ -130,7 +130,7 @@ class Places:
         return found[0].value if found else local_name(node)
 
     def _naming(self, node: str) -> Path | None:
-        """Return a file that mentions a node, for a node about which no file contains statements."""
+        """Return a file that mentions a node; this is for nodes about which no file contains statements."""
         name = local_name(node)
         for file in self.graph.files.values():
             text = file.read_text(encoding="utf-8") if file.suffix == ".ttl" else ""
@@ -186,7 +186,7 @@ def relative(node: str, file: Path) -> str:
 
 
 def _line(file: Path | None, node: str) -> int:
-    """Return the first line of a Turtle file with a statement about a node, or else the first line that mentions the node."""
+    """Return the first line of a Turtle file that states something about a node, or else the first line that mentions the node."""
     if file is None or file.suffix != ".ttl":
         return 0
     text, short = file.read_text(encoding="utf-8"), local_name(node)

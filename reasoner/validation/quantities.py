@@ -341,7 +341,7 @@ def _possible(sign: str, left: Range, right: Range) -> bool:
 
 
 def _narrowed(sign: str, left: Range, right: Range) -> Range:
-    """Return the part of the left range in which a comparison with some number of the right range is true."""
+    """Return the part of the range `left` for which a comparison with some number of the range `right` is true."""
     low = max(left[0], right[0]) if sign in (">", ">=", "=") else left[0]
     high = min(left[1], right[1]) if sign in ("<", "<=", "=") else left[1]
     return low, high
