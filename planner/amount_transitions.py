@@ -79,7 +79,7 @@ def _now(situation: str, key: str, constant: Constant) -> str:
 
 @lru_cache(maxsize=64)
 def _measured(rows: Rows) -> Mapping[tuple[str, ...], Number]:
-    """Return the tuples of a relation as a mapping: the number in the last place of a tuple, by the other arguments."""
+    """Return the number in the last place of each tuple of a relation, by the other arguments of the tuple."""
     return {row[:-1]: number(row[-1]) for row in rows}
 
 

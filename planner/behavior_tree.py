@@ -84,7 +84,7 @@ class Together:
 
 @dataclass(frozen=True)
 class Subtree:
-    """A named subtree: the whole tree, the marks, or the sub-steps of a step."""
+    """A named subtree: the whole tree, the nodes that mark completed steps, or the sub-steps of a step."""
 
     name: str
     child: Node
@@ -146,7 +146,7 @@ class _Tree:
         return [Fact(symbol, rest) for symbol, rest in rests if rest is not None and symbol not in self.problem.goal]
 
     def marks(self) -> tuple[Node, ...]:
-        """Return the marks of all required primitives, the last primitive first."""
+        """Return the nodes that mark the required primitives as done, the last primitive first."""
         needed = [path for path in self.position if self.needs[path]]
         return tuple(Mark(path, self.kept(path)) for path in reversed(needed))
 

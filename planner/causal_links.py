@@ -122,7 +122,7 @@ class _Written:
 
 
 class _Noting(Facts):
-    """A view of the facts that records which symbols are read, and the values whose holders are read."""
+    """A view of the facts that records two kinds of reads: the value of a symbol, and all symbols with a given value."""
 
     def __init__(self, problem: Problem, state: Mapping[Symbol, str]) -> None:
         super().__init__(problem, state)
@@ -198,8 +198,8 @@ class _Course:
     def in_turn(self, step: Step) -> Iterator[tuple[Step, dict[Cell, str] | None]]:
         """Yield each of the steps that are refined together, with its changes in the state after the steps before it.
 
-        The changes of an inapplicable step are None, and no step follows it. Afterwards, the facts have their previous values
-        again.
+        The changes of an inapplicable step are None, and no step follows it. After the last step, the facts have their previous
+        values again.
         """
         mark = len(self.facts.log)
         for one in step.together:

@@ -37,7 +37,7 @@ MOST_CASES = 200_000
 T = TypeVar("T")
 Case: TypeAlias = "tuple[str, ...]"
 Leaf: TypeAlias = "tuple[tuple[tuple[int, tuple[str, ...]], ...] | None, str]"
-"""The result of a behaviour in a case: the changed entries, each with its possible values, and a violated claim.
+"""The result of a behaviour in a case: the changed entries with their possible values, and the violated claim, if any.
 
 The changed entries are None if the behaviour isn't applicable.
 """

@@ -35,7 +35,7 @@ from confab.reasoner.symbols import (
 WORK = 300_000
 """Maximum number of tests to find the first cause."""
 WORDS, ONE = ("none", "one", "two", "three", "four", "five"), "?one"
-"""Small numbers as words, and the variable that stands for each of several counted individuals."""
+"""The small numbers as words, and the name of a variable for a counted individual."""
 SHOWN = 4
 """Maximum number of facts that a sentence names."""
 

@@ -369,7 +369,7 @@ def _in_stages(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
 
 
 def _by_pairs(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
-    """Return a certificate that two goals about the same individual, including rest values, can't hold together."""
+    """Return a certificate that two goals about the same individual, and the rest values, can't hold together."""
     pairs = []
     for (one, a), (other, b) in combinations(sorted(lowest.problem.goal.items()), 2):
         if a in other.arguments or b in one.arguments:  # pairs whose goals mention each other's values come first

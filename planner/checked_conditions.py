@@ -33,8 +33,8 @@ Candidates: TypeAlias = "Callable[[Stated, Values], Iterable[str]]"
 Lookups: TypeAlias = "dict[tuple[Witness, Arguments], set[Arguments]]"
 """Lookups on which the result of a check depends.
 
-For a witness and the values of its open terms, a lookup contains the individuals that initially satisfy the conditions of the
-witness.
+The key of a lookup is a `Witness` (the condition that a suitable individual exists) and the individuals of its open terms. The
+lookup contains the individuals that satisfy the conditions of the witness in the initial state.
 """
 
 
@@ -45,7 +45,7 @@ class Stated(Protocol):
         """Return the value of a symbol, or None if the symbol doesn't exist."""
 
     def holders(self, situation: str, value: str) -> Iterable[Arguments]:
-        """Return the arguments of the symbols that have a stated value."""
+        """Return the arguments of the symbols whose stated value is `value`."""
 
 
 class Source(Protocol):

@@ -92,7 +92,7 @@ class Total:
         self._terms = tuple(reading.places)
 
     def _added(self, facts: Stated, values: Values) -> bool:
-        """Add one solution to the sum, and request the next solution."""
+        """Add the number of one solution to the sum, and return False to request the next solution."""
         number = self._number(facts.value, values)
         if number is not None:
             self._found[self._names(values)] = number

@@ -1,9 +1,9 @@
 """Contrastive explanations: plan with an enforced alternative, or name the alternative's failing conditions.
 
 There are two kinds of alternatives: steps and choices. An alternative *step* replaces a step of the plan: the earlier steps are
-kept, the alternative step is refined and applied, and the later steps are planned again. An alternative *choice* prescribes an
-individual for the changes of a symbol: every behaviour that changes the symbol and has a suitable role must take this
-individual; the whole task is planned again.
+kept, the alternative step is refined and applied, and the later steps are planned again. An alternative *choice* names an
+individual for the changes of a symbol: every behaviour that changes the symbol must take this individual, if the behaviour has a
+suitable role. The whole task is then planned again.
 """
 
 from __future__ import annotations
@@ -79,8 +79,8 @@ def instead_of(
     ask : callable
         Function that plans a problem.
     place : Step, optional
-        The step to be replaced, which has the level of `behavior`. By default, the most similar step at whose position
-        `behavior` is applicable.
+        The step to be replaced, which has the level of `behavior`. By default, the step most similar to the requested step, among
+        all steps in whose place `behavior` is applicable.
     """
     rules, before = BehaviorReader(problem), cost_of(problem, plan)
     course = list(on_level(plan.steps, behavior.level))
@@ -149,7 +149,7 @@ def with_choice(problem: Problem, plan: Plan, symbol: Symbol, individual: str, a
 def _beyond(
     rules: BehaviorReader, behavior: Behavior, arguments: tuple[str, ...], state: State
 ) -> tuple[Condition, ...]:
-    """Return the condition that keeps an amount within its bounds, or nothing if the amount stays within its bounds."""
+    """If a behaviour moves an amount beyond its bounds, return the condition that forbids this; otherwise return nothing."""
     found = rules.beyond(behavior, arguments, Facts(rules.problem, state))
     if found is None:
         return ()

@@ -45,7 +45,7 @@ def find(places: Sequence[Place], asked: int | str | Sequence[int | str], hint: 
         The step in one of these notations: the number of a step of the first level, counted from 0; ``L3#12`` for step 12 of
         level 3, counted from 0; a path like ``0.1.2``; or words of the step, also as a tuple.
     hint : str
-        The end of the error message that is used if no text is similar to `asked`.
+        The last part of the error message if no step is similar to `asked`.
 
     Raises
     ------

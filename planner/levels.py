@@ -5,7 +5,7 @@ satisfy the conditions of their level, but may violate conditions of the level a
 moved". This module lists the violated conditions.
 
 A level sees a change if a symbol of the level gets another value of the level. A level doesn't see intermediate values of lower
-levels, such as a cup in a hand. Each visible change that persists requires an applicable behaviour of the level that makes the
+levels, such as a cup in a hand. For each visible change that persists, the level must have an applicable behaviour that makes the
 change. A behaviour that makes a visible change may also make the visible changes directly before it.
 """
 

@@ -1,15 +1,14 @@
 """The choice of the soft goals that a plan achieves.
 
-The weight of a soft goal is the cost of leaving the goal unmet. The total cost of a choice of soft goals has two parts: the
-cost of a plan for the hard goals and the chosen soft goals, and the weights of the other soft goals. `preferred` searches for a
-choice with a small total cost:
+The weight of a soft goal is the cost of leaving the goal unmet. The total cost of a choice of soft goals has two parts: the cost of
+a plan for the hard goals and the chosen soft goals, and the weights of the other soft goals. `preferred` searches for a choice with
+a small total cost.
 
-1. Plan for the hard goals alone. If there is no plan for the hard goals, the task has no plan.
-2. Plan for all soft goals together. Start with the choice of all soft goals if there is a plan, otherwise with the empty choice.
-3. Add or drop one soft goal, the heaviest first, if the new choice is cheaper. Repeat until no such change is cheaper.
-4. If `finish` is given, plan again for the chosen soft goals, with more work.
-5. If `prove` is given, compute a lower bound for the choice and for all choices that could be cheaper. Choices with a smaller
-   sum of unmet weights come first.
+First, `preferred` plans for the hard goals alone. If there is no plan for the hard goals, the task has no plan. Second, it plans
+for all soft goals together. The first choice contains all soft goals if there is such a plan, otherwise no soft goal. Third, it
+adds or drops one soft goal at a time, the heaviest first, until no such change makes the choice cheaper. If `finish` is given,
+`preferred` then plans again for the chosen soft goals, with more work. If `prove` is given, it finally computes a lower bound for
+the choice and for all choices that could be cheaper. Choices with a smaller sum of unmet weights come first.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ Goals: TypeAlias = frozenset[Symbol]
 MOST_CHOICES = 200
 """Maximum number of choices for which a separate plan is searched in order to prove that no other choice is cheaper."""
 PRECISION = 1_000_000
-"""Maximum denominator of the stated cost of meeting a soft goal; costs of plans are sums of floating-point numbers."""
+"""Maximum denominator of the stated cost of meeting a soft goal; this cost is rounded, since costs are floating-point numbers."""
 
 
 def preferred(
@@ -60,7 +59,7 @@ def preferred(
         The task without the unmet soft goals.
     Outcome
         The result of planning for the returned task; `forgone` contains the unmet soft goals. With `prove`, `bound` is a lower
-        bound on the total cost of any choice, minus the unmet weights of the returned plan.
+        bound on the total cost of any choice, reduced by the weights of the unmet soft goals.
     """
     if not problem.weights:
         return problem, (prove or search)(problem)

@@ -285,9 +285,9 @@ class PythonWriter:
         return source, tests
 
     def listed(self, situation: str, value: str) -> bool:
-        """Return whether the table lists the symbols that have a value.
+        """Return whether the table lists the symbols with the given value.
 
-        The table has no lists for defined situations, and for a boolean situation type only the list of true symbols.
+        The table has no such lists for defined situations. For a boolean situation type, the table lists only the true symbols.
         """
         domain = self.problem.domain
         return situation not in domain.rules and (value == TRUE or not domain.situations[situation].boolean)

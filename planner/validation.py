@@ -91,8 +91,8 @@ def carried_out(
         Dictionary to which the checker adds the individuals on which the check depends. If the problem has all of these
         individuals, every larger problem of the same scene has the same faults.
     lifted : mapping of name to behaviour, optional
-        The behaviours before the expansion of effects on every member of a class; individuals that these effects can change are
-        also recorded in `lookups`.
+        The behaviours in their original form, in which an effect may apply to every member of a class. The individuals that such an
+        effect can change are also recorded in `lookups`.
     """
     rules = BehaviorReader(problem, lookups, lifted)
     check = _Check(problem, max((step.level for step in plan.walk()), default=0), rules)
@@ -167,7 +167,7 @@ class _Check:
         return True
 
     def restless(self, marks: Sequence[int]) -> Iterator[tuple[Symbol, str, str]]:
-        """Yield the symbols that aren't at rest and differ from their value at one of the marks of the log.
+        """Yield the symbols that aren't at rest and whose value has changed since one of the marks of the log.
 
         Each symbol comes with its value and its rest value.
         """
@@ -428,7 +428,7 @@ class BehaviorReader:
         return False
 
     def remember(self, facts: Facts, level: int | None = None) -> None:
-        """Make remembered symbols true if the symbols that they remember are true.
+        """Make each remembered symbol true if the symbol that it keeps in memory is true.
 
         If `level` is given, only the remembered symbols that the level sees are changed.
         """
@@ -479,9 +479,9 @@ class BehaviorReader:
         return None if more is None else found + more
 
     def beyond(self, behavior: Behavior, arguments: Arguments, facts: Facts) -> tuple[Fact, Fact] | None:
-        """Return an amount before and after a behaviour whose preconditions hold, if the new amount isn't allowed.
+        """Return the first amount that a behaviour would make invalid: the amount before and after the behaviour.
 
-        Return None if every new amount is allowed.
+        Return None if every new amount is allowed, or if the behaviour isn't applicable.
         """
         read = self.read(behavior)
         values = [*arguments, *read.terms[len(arguments) :]]

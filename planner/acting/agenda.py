@@ -21,8 +21,7 @@ class Agenda:
     begun : mapping of path to State
         The situation before each step in progress.
     sound : bool
-        Whether the steps in progress would still have been applicable at their begin if the facts observed since then had
-        already held.
+        Whether each step in progress would be applicable in the situation before it, updated with the facts observed since then.
     """
 
     planned_for: Problem

@@ -37,8 +37,8 @@ from confab.reasoner.symbols import (
 class Belief:
     """The planning task according to the executive's belief.
 
-    `problem` contains the situation, the goal, and only the static facts and behaviours that aren't in doubt; `certain` is the
-    same problem with the static facts and behaviours in doubt. `obstacles` are discovered objects that can't be moved;
+    `problem` contains the situation, the goal, and only the static facts and behaviours that aren't in doubt. `certain` is the same
+    problem, but it also contains the static facts and behaviours in doubt. `obstacles` are discovered objects that can't be moved;
     behaviours that would move an obstacle are excluded from `problem` and from `certain`. `withdrawn` and `refuted` contain the
     static facts and the behaviours in doubt. `unseen` are the symbols that the first observation didn't include.
     """

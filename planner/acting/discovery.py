@@ -15,7 +15,7 @@ class Discovery:
     ----------
     individual : str
     kinds : tuple of str
-        The classes of the individual; superclasses of these classes follow.
+        The classes of the individual; their superclasses needn't be listed.
     relations : tuple of (str, tuple of str)
         Static facts about the individual.
     fixed : str

@@ -48,7 +48,7 @@ class Intervention:
     after : int or tuple of int, optional
     at : float, optional
     text : str
-        The intervention as it was written.
+        The original text of the intervention.
     """
 
     change: InterventionKind

@@ -65,13 +65,13 @@ def act(
     problem : Problem
         The initial situation, and the goal.
     world : World
-        An object with `observe` and `execute`: `confab.planner.acting.symbolic_world.SymbolicWorld`, PyBullet, a robot.
+        A simulation, a robot or a `confab.planner.acting.symbolic_world.SymbolicWorld`: any object with `observe` and `execute`.
     plan : Plan, optional
         The first plan; if left out, `act` plans.
     interventions : sequence of Intervention
         The interventions by people during the episode.
     planner : callable, optional
-        Function that plans from scratch, from a situation in which all hands are at rest; the default planner if left out.
+        Function that makes a new plan from a situation in which all hands are at rest; if left out, the default planner.
     retry_policy : RetryPolicy
     observer : callable, optional
         Function that is called with every `Event`.

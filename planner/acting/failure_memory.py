@@ -83,7 +83,7 @@ def without_relations(problem: Problem, gone: Iterable[Static]) -> Problem:
 def refuted_by(
     problem: Problem, chain: Sequence[Step], facts: Sequence[Fact], why: str, likewise: Sequence[Refutation] = ()
 ) -> tuple[Refutation, ...]:
-    """Return the refutations by a failed primitive: the primitive and its ancestors are impossible while some facts hold.
+    """Return refutations after a failed primitive: the primitive and some of its ancestors are impossible while `facts` hold.
 
     Parameters
     ----------
@@ -95,8 +95,8 @@ def refuted_by(
         sees all facts in `facts`.
     why : str
     likewise : sequence of Refutation
-        Primitives that are refuted for the same reason, with any hand. An ancestor is refuted if no other behaviour has its
-        effects. Refutations that `likewise` implies are left out.
+        Refutations of similar primitives for the same reason, for example with another hand. An ancestor is refuted if no other
+        behaviour has its effects. Refutations that `likewise` implies are left out.
     """
     exact, found = Refutation(chain[-1].behavior, chain[-1].arguments, tuple(facts), why), list[Refutation]()
     steps = chain if facts and not any(one.covers(exact) for one in likewise) else ()
@@ -115,7 +115,7 @@ def _seen(problem: Problem, behavior: str, facts: Iterable[Fact]) -> bool:
 
 
 def _above(problem: Problem, one: Refutation, likewise: Collection[str]) -> Iterator[Refutation]:
-    """Yield refutations of upper-level behaviours whose effects can be made only by the refuted behaviours in `likewise`."""
+    """Yield refutations of the upper-level behaviours whose effects only the behaviours in `likewise` can make."""
     every, own = problem.domain.behaviors, problem.domain.behaviors[one.behavior]
     bound = {parameter.name: name for parameter, name in zip(own.parameters, one.arguments, strict=True) if name}
     for effect in own.effects:

@@ -1,11 +1,11 @@
 """Repair of a plan: steps that are still valid are kept, and the other steps are planned again.
 
-The remaining steps of the plan are replayed on a state table from the present situation. A step is dropped if its purpose holds
-already, or is no longer a goal. A step is kept if its primitives still have their effects; otherwise the step is refined again
-(for another hand, for instance). A step is put off if the step isn't applicable yet; later steps about the same individuals are
-then put off, too. The steps that were put off are tried again after each successful step. The default planner then achieves the
-remaining goals, on the same state table. If a hand is in the middle of a step, the step is finished first, or the hand is
-brought to rest.
+The remaining steps of the plan are replayed on a state table from the present situation. A step is dropped if the facts that it
+should make true hold already, or are no longer goals. A step is kept if its primitives still have their effects; otherwise the step
+is refined again (for another hand, for instance). A step is put off if the step isn't applicable yet; later steps about the same
+individuals are then put off, too. The steps that were put off are tried again after each successful step. The default planner then
+achieves the remaining goals, on the same state table. If a hand is in the middle of a step, the step is finished first, or the hand
+is brought to rest.
 
 `confab.planner.validation` checks every repaired plan.
 """
@@ -39,7 +39,7 @@ MOST = 5_000
 """Maximum number of expansions of a repair; at this number, the whole task is planned again."""
 
 SHARE = 0.5
-"""Share of the remaining time for a repair; the other time is reserved for a new plan."""
+"""Share of the remaining time for a repair; the rest of the time is reserved for a new plan."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ def repair_or_replan(
     planned : Problem
         The problem for which `rest` was planned: the expected situation, and the goal.
     planner : callable, optional
-        Function that plans from scratch, from a situation in which all hands are at rest; the default planner if left out.
+        Function that makes a new plan from a situation in which all hands are at rest; if left out, the default planner.
     using : Compiled, optional
         The result of `confab.planner.hierarchical.planner.compiled` for the same domain, individuals and static facts.
     in_progress : bool
@@ -119,8 +119,8 @@ def repair(
 ) -> Repaired | None:
     """Return steps that achieve the open goals and contain as many valid steps of `rest` as possible, or None.
 
-    The lower bound `least` is the cost of the step in progress, of the planned steps that mention no changed individual, of
-    one step per open goal, and of one step per changed individual.
+    The lower bound `least` is the total cost of some steps: the step in progress, the planned steps that name no changed
+    individual, one step per open goal, and one step per changed individual.
     """
     wanted = planned.goal
     touched = changed_individuals(planned, problem)
@@ -332,7 +332,7 @@ def _redo(call: Call, step: Step, begun: bool = False) -> RefinedStep | None:
 
 
 def _achieve_instead(call: Call, effects: Mapping[Cell, str]) -> None:
-    """Achieve the current goal value of a symbol instead of the value that a step gives, if one step can achieve the goal."""
+    """For each symbol that a step would change, achieve the symbol's open goal instead, if one step can achieve it."""
     for cell in effects:
         if cell in call.goal and not call.met(cell):
             call.achieve(call.program.levels[0], cell, ONE_STEP)
@@ -363,7 +363,7 @@ def _effects(call: Call, step: Step) -> dict[Cell, str]:
 
 
 def _last_steps(call: Call) -> set[int]:
-    """Return the positions of the steps that last give an open goal its value.
+    """Return the positions of steps: for each open goal, the last step that changes the goal's symbol.
 
     Consecutive steps below the first level count as one group.
     """

@@ -36,7 +36,7 @@ class Retries:
     ----------
     policy : RetryPolicy
     attempts : mapping of behaviour and arguments to int
-        The number of failures of each primitive since the doubts were last dropped.
+        The number of failures of each primitive since all facts were last trusted.
     rounds : int
         The number of rounds of attempts, including the first.
     pondered : mapping of situation to int

@@ -47,7 +47,7 @@ def partial_order(problem: Problem, primitives: Sequence[Step]) -> PartialOrder:
     Raises
     ------
     ValueError
-        A primitive isn't applicable after the primitives before it.
+        A primitive isn't applicable in the state that the earlier primitives lead to.
     """
     states: list[State] = [problem.initial]
     writes: list[dict[Symbol, tuple[str | None, str]]] = []

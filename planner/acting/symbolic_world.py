@@ -164,7 +164,7 @@ def disturbed(problem: Problem, state: State, intervention: Intervention) -> dic
 
 
 def _let_go(problem: Problem, state: State, after: dict[Symbol, str], individual: str) -> None:
-    """Where an individual is the value of a symbol, put the individual's former place instead, or the symbol's rest value."""
+    """Replace each value that is a released individual by the individual's former place, or by the symbol's rest value."""
     own = [value for symbol, value in state.items() if individual in symbol.arguments[:1]]
     for symbol, value in state.items():
         if value == individual and symbol in after:

@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 logger = logging.getLogger(__name__)
 
 INTERRUPTED = "interrupted"
-"""Code of a primitive that was stopped; a stopped primitive isn't a failure, so the executive learns nothing from a stop."""
+"""Code in the verdict on a stopped primitive; a stop isn't a failure, so the executive learns nothing from it."""
 
 WITHOUT_EFFECT = "without effect"
-"""Code of a primitive that was reported as done, although none of its effects is observed."""
+"""Code in the verdict on a primitive that was reported as done, although none of its effects is observed."""
 
 
 class WorldError(Exception):

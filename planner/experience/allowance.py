@@ -9,7 +9,7 @@ from typing import TypeVar
 from confab.planner.hierarchical.workspace import Workspace
 
 WASTE, FREE = 10, 500_000
-"""Inverse of the share of effort and of expansions that unsuccessful rules may use, and effort credited before the call."""
+"""Unsuccessful rules may use 1 / `WASTE` of the expansions, and 1 / `WASTE` of the sum of all effort and `FREE`."""
 Found = TypeVar("Found")
 
 
@@ -23,7 +23,7 @@ class Allowance:
     Attributes
     ----------
     spent : int
-        Effort of matching rules, in states times operators.
+        Effort of matching rules; the unit is one operator in one state.
     wasted_effort : float
         Effort of failed attempts, for matching rules and for searches.
     wasted_expansions : int

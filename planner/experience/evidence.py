@@ -55,7 +55,7 @@ class FactReader:
         return [(asks, answer(roles[i], named)) for i, asks, answer in plan]
 
     def individuals(self, rule: Rule, roles: tuple[str, ...]) -> list[Fact]:
-        """Return the individuals in those roles of a rule that few individuals can fill."""
+        """Return the individual in each role of a rule, for the roles whose class has few members."""
         members = self.problem.members
         return [
             (f"who is {role[1:]}", individual)
@@ -115,7 +115,7 @@ class FactReader:
 def fillers(method: Method, roles: Sequence[str | None], problem: Problem) -> list[Fact]:
     """Return the facts about each individual in an open role of a small class.
 
-    One fact is about the individual alone; further facts are about its pairs with the individuals of the step.
+    One fact is about the individual alone. Each other fact is about the individual together with an individual of the step.
     """
     found = list[Fact]()
     for role, individual in zip(method.open, roles[method.roles :], strict=True):
@@ -146,9 +146,9 @@ class Scorer:
         self._asked: dict[str, frozenset[str]] = {}
 
     def weights(self, rule: Rule | Method) -> Mapping[Fact, float]:
-        """Return the summand of each counted fact in the cogency of a rule, in ln odds.
+        """Return the contribution of each counted fact to the cogency of a rule, in ln odds.
 
-        The summand of the rule itself is always included.
+        The contribution of the rule itself is always included.
         """
         found = self._weights.get(rule.name)
         if found is None:
@@ -167,7 +167,7 @@ class Scorer:
         return found
 
     def factors(self, rule: Rule | Method, facts: Iterable[Fact], individuals: Iterable[Fact] = ()) -> Iterator[Factor]:
-        """Yield the summands of the cogency of following a rule in a situation with the given facts."""
+        """Yield the contributions to the cogency of following a rule in a situation with the given facts."""
         weights, liked = self.weights(rule), self.preferred.get(rule.name, {})
         for fact in (ITSELF, *facts):
             if fact in weights:
@@ -178,7 +178,7 @@ class Scorer:
                 yield Factor(fact, log((c + 0.5) / (p + 0.5)))
 
     def cogency(self, rule: Rule | Method, facts: Iterable[Fact], individuals: Iterable[Fact]) -> float:
-        """Return the sum of the summands of the cogency."""
+        """Return the sum of the contributions to the cogency."""
         return sum(factor.weight for factor in self.factors(rule, facts, individuals))
 
     def score(self, reader: FactReader, rule: Rule, roles: tuple[str, ...]) -> float:

@@ -35,7 +35,7 @@ The cost of a goal may be smaller than the number of required steps, because the
 TWICE = 2
 """Maximum number of times that `RulePolicy.achieve_all` achieves the same goal; a later goal may undo an earlier goal once."""
 CASES, NEARLY = 3, 0.95
-"""An order of two goals is used if at least `CASES` plans had this order, and at least the share `NEARLY` of all plans."""
+"""Two goals are ordered if at least `CASES` plans achieved both in this order; `NEARLY` is the required share of such plans."""
 
 Steps: TypeAlias = "list[RefinedStep]"
 
@@ -51,7 +51,7 @@ class RulePolicy:
     score : function of an instance, optional
         Of equally cheap instances, the one with the greatest score is tried first.
     joins : dict, optional
-        Compiled rules of other calls of the same program; newly compiled rules are added.
+        Compiled rules that several planning calls share; newly compiled rules are added.
     ranked : function of a method and individuals for its roles, optional
         Function that returns the individuals in order of preference.
     """
@@ -308,7 +308,7 @@ class RulePolicy:
         return None
 
     def suffices(self, instance: RuleInstance, position: int, goal: Goal) -> bool:
-        """Return whether a goal alone makes an unmet condition true.
+        """Return whether achieving a goal suffices to satisfy an unmet condition.
 
         Goals about amounts and defined situation types aren't tested; the result is then true.
         """
@@ -343,7 +343,7 @@ class RulePolicy:
         return None
 
     def achieve_jointly(self, level: int, goals: Sequence[Goal]) -> Steps | None:
-        """Achieve the conditions of the last steps of all goals first, then apply the last steps; return the steps.
+        """Achieve the conditions of the last step of every goal first, then apply all these last steps; return the steps.
 
         This method is for goals that make each other unreachable. The rule instances of two goals never consume the same
         individual. On failure, the method returns None and may leave the table changed.
@@ -376,7 +376,7 @@ class RulePolicy:
         return steps
 
     def achieve_nearest(self, level: int, subgoals: Sequence[Goal]) -> Steps | None:
-        """Achieve the cheapest subgoal after which other subgoals of about the same cost remain reachable.
+        """Achieve the cheapest subgoal that keeps the other subgoals of similar or lower cost reachable.
 
         Return None if there is no such subgoal.
         """

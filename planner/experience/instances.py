@@ -27,7 +27,7 @@ COMPARED, TRIES = 40, 3
 FARTHEST, SLACK = 30, 2
 """Maximum cost of a goal, and maximum difference between the cost of a rule instance and the least cost."""
 MATCHING = 5
-"""Cost of matching a rule, in states times operators (about a microsecond each)."""
+"""Cost of matching a rule; the unit is one operator in one state, about a microsecond."""
 
 Roles: TypeAlias = "tuple[str, ...]"
 Goal: TypeAlias = "tuple[Cell, str]"
@@ -72,7 +72,7 @@ class Instances:
     score : function of an instance, optional
         Of equally cheap instances, the one with the greatest score is tried first.
     joins : dict, optional
-        Compiled rules of other calls of the same program; newly compiled rules are added.
+        Compiled rules that several planning calls share; newly compiled rules are added.
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ class Instances:
         self.found: dict[Query, list[RuleInstance]] = {}
         self.least: dict[Query, int] = {}
         self.more_than: dict[Query, float] = {}
-        """Known bounds of costs: the cost of a goal is at most its bound in `least`, and exceeds its bound in `more_than`."""
+        """Known bounds of the costs of goals: the cost is at most the bound in `least`, and exceeds the bound in `more_than`."""
         self.seen: set[Query] = set()
         self.cut = False
         self.picked: dict[tuple[int, str], Sequence[str]] = {}
@@ -296,8 +296,8 @@ class Instances:
     def undone(self, level: int, instance: RuleInstance) -> int:
         """Return the number of achieved goals that the step of a rule instance undoes.
 
-        For an instance with unmet conditions, return the number of achieved goals that are undone by achieving those unmet
-        conditions that have a single goal.
+        If an instance has unmet conditions, only the conditions with a single goal count: return the number of achieved goals that
+        these single goals undo.
         """
         if instance.unmet:
             alternatives = (self.goals_of(level, instance, n) for n in instance.unmet)

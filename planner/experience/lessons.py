@@ -381,9 +381,9 @@ def lesson_of_failure(
 ) -> Lesson:
     """Return the lesson of a step whose sub-step with the given path failed.
 
-    The lesson counts a failure of the rules that would have chosen the step, of the facts about the individuals in the
-    rules' roles, and of the individuals in the step's refinement. Steps that are refined together teach nothing, since
-    any of them may have caused the failure.
+    The lesson counts one failure for each of these: the rules that would have chosen the step, the facts about the individuals in
+    the rules' roles, and the individuals in the step's refinement. Steps that are refined together teach nothing, since any of them
+    may have caused the failure.
     """
     call = Call(problem, using, None, SHORT.expansions)
     policy = Memory(experience).policy(call)

@@ -1,9 +1,9 @@
 """Matching of rules: each rule is compiled to a Python function that yields the rule instances in the current state.
 
-The static conditions of an instance hold. Conditions on the state may be *unmet*, because steps can achieve these conditions
-later. The preferred candidates for a role are values of symbols and holders of values. If no preferred candidate fits, or
-if all instances are requested, the candidates are one individual of each symmetry class, taken from a static relation or
-from the role's class. Different roles have different individuals.
+The static conditions of an instance hold. Conditions on the state may be *unmet*, because steps can achieve these conditions later.
+The preferred candidates for a role are values of symbols, and objects that have a required value. If no preferred candidate fits,
+or if all instances are requested, the candidates come from a static relation or from the role's class, one individual of each
+symmetry class. Different roles have different individuals.
 """
 
 from __future__ import annotations
@@ -143,7 +143,7 @@ class _Join:
         return found + self.ready() + self.ahead(role)
 
     def ahead(self, role: str) -> list[str]:
-        """Return tests that unbound roles still have candidates, according to the static relations of a role's individual."""
+        """For each static relation between a role and unbound roles, return a test that an unbound role has a candidate."""
         found = []
         for c in self.hard:
             if isinstance(c, RelationCondition) and not c.negated and role in c.arguments:

@@ -368,7 +368,7 @@ class PlanTrace:
     # ------------------------------------------------------------------------------------------------------------ order
 
     def orders(self) -> Iterator[Order]:
-        """Yield the order of every two goals that different steps achieved."""
+        """For every two goals that different steps achieved, yield the order in which they were achieved."""
         for first, then in permutations(self.achieved, 2):
             if self.achieved[first] < self.achieved[then]:
                 yield Order.of(first, then, self.constants)

@@ -42,7 +42,7 @@ class Derived:
     def ways(self) -> Sequence[tuple[Sequence[int], int]]:
         """The alternatives of all bits, each as the numbers of the required bits and the number of the resulting bit.
 
-        The alternatives of an opposite bit are listed without required bits.
+        For an alternative of an opposite bit, the list of required bits is empty.
         """
         return [
             ([] if bit.opposite else [low.bit_length() - 1 for low in _single(way)], bit.mask.bit_length() - 1)
@@ -60,7 +60,7 @@ class Derived:
     def effort(self) -> int:
         """Maximum number of alternatives examined after a change.
 
-        Parts of a single bit count only if arrays can replace the examination.
+        If arrays are never used, alternatives of parts with a single bit don't count.
         """
         return min(sum(_ways(part) for part in self.parts if len(part) > 1 or self._few < self._all), self._few)
 

@@ -32,9 +32,9 @@ class Candidate(NamedTuple):
 class SearchOrder(Protocol):
     """Interface of a search order.
 
-    `work` counts the bits processed by relaxed plans; a turn of the order ends when `work` reaches `turn`. `reached` maps each
-    state to the last accepted candidate. `bytes` is the memory of the order without the states in `reached`. `best` is the final
-    state of the best plan. `best` is None if no plan was found.
+    `work` counts the bits processed by relaxed plans; the turn of a search order ends when `work` reaches `turn`. `reached` maps
+    each state to the last accepted candidate. `bytes` is the memory of the search order without the states in `reached`. `best` is
+    the final state of the best plan. `best` is None if no plan was found.
     """
 
     reached: dict[int, Candidate]

@@ -27,7 +27,7 @@ Lookahead = Callable[[int, Sequence[int]], "tuple[int, list[int]]"]
 
 
 class Greedy:
-    """The search order by h_FF for a task; the order adds its effort to `counts`."""
+    """The search order by h_FF for a task; the search order adds its effort to `counts`."""
 
     def __init__(self, task: Task, evaluate: Evaluate, lookahead: Lookahead, counts: Counts) -> None:
         self.task, self.evaluate, self.lookahead, self.counts = task, evaluate, lookahead, counts

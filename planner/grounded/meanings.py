@@ -21,9 +21,9 @@ from confab.reasoner.derivation import circular
 from confab.reasoner.symbols import Rule
 
 SAID_ONCE = 20_000
-"""Shared conditions are evaluated once per state if this saves at least this number of conditions, summed over all operators.
+"""Minimum number of conditions, over all operators, that must be saved before a shared condition is evaluated once per state.
 
-The evaluation of this number of conditions for a relaxed plan takes a millisecond.
+A relaxed plan evaluates this number of conditions in a millisecond.
 """
 
 

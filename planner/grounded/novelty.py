@@ -47,7 +47,7 @@ class Progress(NamedTuple):
 class Novelty:
     """The search order by novelty for a task.
 
-    `marks` is the mask of the landmarks. `relaxing` is the work of a relaxed plan in bits. The order adds its effort to
+    `marks` is the mask of the landmarks. `relaxing` is the work of a relaxed plan in bits. The search order adds its effort to
     `counts`.
     """
 

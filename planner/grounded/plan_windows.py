@@ -45,7 +45,7 @@ SIZES = (8, 16, 32)
 OPERATORS, EVALUATIONS, SHARE = 150, 100, 2_000
 """Limits of the search of a window: the number of operators, and the minimum number of evaluations of h_FF.
 
-If the work divided by `SHARE` is greater than this minimum, the search may use that number of evaluations.
+The maximum number of evaluations is `EVALUATIONS`, or the work divided by `SHARE` if this is greater.
 """
 WEIGHT = 3
 """Weight of h_FF when the whole plan is searched again with all operators."""
@@ -299,7 +299,7 @@ class _Windows:
 
     @cached_property
     def arrays(self) -> tuple[Ints, Ints, Ints]:
-        """Three arrays: the owners of the relaxed operators, and the relaxed operators of all required and all added bits."""
+        """Three arrays: the owner of each relaxed operator, and the relaxed operator of each required and each added bit."""
         task = self.task
         number = np.arange(len(task.owners))
         return (
@@ -367,8 +367,8 @@ class _Windows:
     def part(self, operators: list[int], state: int, wanted: int) -> tuple[Task, list[int]]:
         """Return the task of reaching the required bits from a state by the given operators, and the operators of this task.
 
-        The task has no bits for symbols that the given operators don't change. If an operator requires that a symbol without
-        bits has another value than in these states, the operator is excluded.
+        The task has no bits for symbols that the given operators don't change. An operator is excluded if it requires that such a
+        symbol has another value than in these states.
         """
         task = self.task
         if task.amounts is not None:

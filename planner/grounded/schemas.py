@@ -216,7 +216,7 @@ class _Compiler:
     def _flat(
         self, conditions: Sequence[Condition], shared: set[str], kinds: dict[str, str], fresh: Iterator[int]
     ) -> Iterator[Condition]:
-        """Yield conjuncts in which conditions replace positive witnesses; variables outside `shared` get unique names."""
+        """Yield conjuncts with the conditions of positive witnesses in their place; variables outside `shared` get unique names."""
         for condition in conditions:
             if isinstance(condition, Witness) and not condition.negated:
                 yield from self._opened(

@@ -173,7 +173,7 @@ class _Sums:
 
     @cached_property
     def limits(self) -> Mapping[int, tuple[int, Fraction]]:
-        """For the bit of each comparison that is a lower bound on one amount, the position of the amount and the bound."""
+        """The bits of comparisons that bound a single amount from below, each with the position of the amount and the bound."""
         return {
             bit: (difference.terms[0][0], Fraction(-difference.constant) / Fraction(difference.terms[0][1]))
             for (difference, _), bit in self.amounts.bits.items()

@@ -48,7 +48,7 @@ def nothing(state: int) -> float:
 class Cheapest:
     """The search order of A* by a bound on the remaining cost.
 
-    `lower` is the proved lower bound on the cost of a plan. The order adds its effort to `counts`.
+    `lower` is the proved lower bound on the cost of a plan. The search order adds its effort to `counts`.
     """
 
     def __init__(

@@ -100,7 +100,7 @@ class Task:
     prices : mapping of operator to Linear
         The costs that depend on amounts.
     barred : set of (state, operator)
-        Pairs that the search excludes, because the operator's step has no refinement in the state.
+        Pairs of a state and an operator that the search excludes, because the operator's step has no refinement in the state.
     """
 
     problem: Problem

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from confab.planner.grounded.task import Task
 
 FEW = 1_000
-"""Effort of the searches after which the lowest level is tested for unsolvability, as a number of examined states of this level."""
+"""The lowest level is tested for unsolvability when the searches have cost as much as examining this number of its states."""
 
 
 @dataclass
@@ -334,7 +334,7 @@ class Agenda:
             self._looked = looked_at(self._lowest, call.space, self._looked)
 
     def _expects_a_plan(self) -> bool:
-        """Return whether advice promises a plan, and the searches have cost less work than one scope."""
+        """Return whether advice promises a plan, and the searches so far have cost less work than one search of a scope."""
         advice = self.call.advice
         return advice is not None and advice.expects and self.call.space.worked < WIDER.work
 

@@ -95,7 +95,7 @@ def _without_cycles(
 
 
 def _circle(last: _Done, latest: Mapping[Cell, list[_Done]]) -> list[_Done]:
-    """Return the latest steps that change exactly the symbols that `last` changes, and that together restore the old values.
+    """Return the latest steps that all change the same symbols as `last` and together restore the old values.
 
     The result ends with `last`; it is empty if there are no such steps.
     """

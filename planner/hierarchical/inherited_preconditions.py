@@ -79,7 +79,7 @@ def _inherited(
 def _unseen_values(
     problem: Problem, behavior: Behavior, effect: ValueEffect, level: int
 ) -> Iterator[tuple[Condition, ...]]:
-    """For each value of an effect that the level doesn't see, yield an alternative that allows the value."""
+    """For each possible value of an effect, if the level doesn't see the value, yield an alternative that allows it."""
     kinds = behavior.kinds
     values = problem.classes.get(kinds[effect.value], ()) if effect.value in kinds else (effect.value,)
     unknown = [value for value in values if problem.value_levels.get(value, 1) > level]
@@ -129,7 +129,7 @@ def _conditions_for(
 def _closed(conditions: Sequence[Condition], known: set[str], terms: Mapping[str, str]) -> Iterator[Condition]:
     """Yield the conditions that mention only known terms.
 
-    Also yield a witness for each variable that known terms determine, with the conditions on this variable.
+    For each variable that known terms determine, also yield a witness: the condition that a suitable individual exists.
     """
     yield from (condition for condition in conditions if mentions(condition) <= known)
     for condition in conditions:

@@ -5,8 +5,9 @@ Each behaviour has a function ``forward`` that returns its changes (`confab.plan
 and the unmet preconditions of the binding.
 
 The candidates for an unbound parameter come from the cheapest source. The sources are a static relation to a bound term, the
-holders of a value that no behaviour can change, and the members of the parameter's class. Terms that only the state determines are
-bound last. Conditions that depend on the state are *soft*: a soft condition may be unmet, and subgoals then help to satisfy it.
+objects with a given value that no behaviour can change, and the members of the parameter's class. Terms that only the state
+determines are bound last. Conditions that depend on the state are *soft*: a soft condition may be unmet, and subgoals then help to
+satisfy it.
 """
 
 from __future__ import annotations
@@ -52,9 +53,9 @@ The binding is None if all conditions are met.
 class Achiever:
     """An effect of a behaviour, as an achiever of the effect's value.
 
-    `soft` contains the conditions that depend on the state. `determined` maps a variable to the symbol whose value is the variable;
-    the symbol is a situation type with argument terms. For a rule, `determining` contains the conditions that determine variables.
-    If `deep`, the subgoals of a negated condition include the facts inside nested witnesses.
+    `soft` contains the conditions that depend on the state. `determined` maps each variable that stands for the value of a symbol
+    to this symbol, that is, to a situation type with argument terms. For a rule, `determining` contains the conditions that
+    determine variables. If `deep`, the subgoals of a negated condition include the facts inside nested witnesses.
     """
 
     behavior: str
@@ -293,7 +294,7 @@ class Program:
         return term, text
 
     def _pick(self, candidates: str, term: str, behavior: Behavior) -> str:
-        """Return an expression for the candidates of a term; of many candidates, it yields a free one of each symmetry class."""
+        """Return an expression for the candidates of a term; many candidates are reduced to a free one of each symmetry class."""
         taken = next((identifier("holders", e.situation) for e in behavior.effects if e.value == term), "{}")
         return f"pick({candidates}, {taken}, few, now)"
 

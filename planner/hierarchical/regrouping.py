@@ -1,7 +1,8 @@
-"""Regrouping: runs of steps of one level become refinements of upper-level steps with the same effect.
+"""Regrouping: a run of consecutive steps of one level becomes the refinement of an upper-level step with the same effect.
 
-If a run doesn't have the effect of any single step of the level above, it becomes the joint refinement of several steps
-(docs/levels.md). Each of these steps takes place in the run: in some state of the run, all facts that the step makes true hold.
+If no single step of the level above has the effect of a run, the run becomes the joint refinement of several steps
+(docs/levels.md). Each of these upper-level steps takes place during the run: in some state of the run, all facts that the step
+makes true hold.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ Seen: TypeAlias = "tuple[str, ...]"
 LONGEST = 60
 """Maximum number of steps that are grouped under one step of the level above."""
 WORK = 100_000
-"""Maximum number of steps that are tried in the search for several upper-level steps that a run refines together."""
+"""Maximum number of upper-level steps that are tried in the search for steps with the same joint effect as a run."""
 MOST_FILLED = 1_000
 """Maximum number of instances of a behaviour that are tried for one fact.
 
@@ -35,7 +36,7 @@ The instances differ in the individuals that the fact doesn't determine.
 
 
 def under_the_levels_above(problem: Problem, plan: Plan, using: Compiled | None = None) -> Plan:
-    """Return a plan of one level in which runs of steps are grouped under upper-level steps with the same effect.
+    """Return a plan of one level in which runs of consecutive steps are grouped under upper-level steps with the same effect.
 
     As few steps as possible stay ungrouped. The result may be invalid; `validate` then rejects the plan.
     """
@@ -145,8 +146,8 @@ class _Course:
     def leading(self, begin: int, end: int, left: int) -> tuple[list[Ground], int]:
         """Return steps of the level that lead from one position to another, and the remaining work.
 
-        The search prefers states with few wrong values; among these, it prefers states in the order in which the given steps
-        make their facts true. If the search fails, return no steps.
+        The search prefers states with few wrong values. Among these, it prefers states whose new facts hold early in the sequence
+        of the given steps. If the search fails, return no steps.
         """
         course, candidates = self.seen[begin : end + 1], self.candidates(begin, end)
         first, last = course[0], course[-1]

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 FEW = 4
 """Maximum size of a class, such as the hands, that is part of every scope.
 
-The objects with a certain value in the scope are added to the scope if their number is at most `FEW`.
+The objects that have an individual of the scope as value are added to the scope if there are at most `FEW` of them.
 """
 
 BITS = 20

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 MUCH = 1_500_000
-"""Maximum work of one search in a large scope, in states times operators."""
+"""Maximum work of one search in a large scope; the unit is one operator in one state."""
 MOST_OPERATORS = 3_000
 """Maximum number of quantified behaviours of a level for which the whole level is searched."""
 
@@ -19,12 +19,11 @@ class SearchBudget:
     steps : int
         Maximum number of relevant steps; 0 for the search of a scope.
     questions : int, optional
-        Maximum number of values that are examined on the chains towards one target to determine the scope; None for the whole
-        level.
+        To determine the scope, at most this number of values is examined for each target; None if the scope is the whole level.
     spares : int
         Number of additional individuals of each symmetry class in the scope.
     work : int
-        Maximum work of one search, in states times operators.
+        Maximum work of one search; the unit is one operator in one state.
     rules : bool
         Whether the planner follows learned rules instead of searching.
     """

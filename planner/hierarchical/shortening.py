@@ -34,14 +34,14 @@ ORDERS = 8
 SHUFFLES = 3
 """Number of random orders of the goals that are tried before small changes of the best order."""
 LEAST_EFFORT = 400_000
-"""Minimum effort that is assumed for finding the first plan, in states times operators.
+"""Minimum effort that is assumed for finding the first plan; the unit is one operator in one state.
 
 Because of this minimum, the planner also shortens plans that were found with little effort.
 """
 LEAST_ROUNDS = 5
 """Minimum number of rounds of repeated shortening; the first rounds may be too short to improve a plan."""
 DOING, BEGINNING = 20, 1_000
-"""Work of replaying a primitive, and work of beginning a call, in states times operators."""
+"""Work of replaying a primitive, and work of beginning a call; the unit is one operator in one state."""
 MANY = 1.25
 """Number of first-level steps per goal above which other orders of the goals are tried."""
 
@@ -59,9 +59,9 @@ def shortened(call: Call, improve: int, leave_levels: bool, advised: Callable[[C
 def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Call], None]) -> None:
     """Shorten the steps of a call in rounds, each with twice the work of the round before.
 
-    By default, there is one round. A call with repeated shortening has at most twice as many rounds as the number of the last
-    round that made the plan cheaper. If windows of the lowest level can make refinements cheaper, this call has at least
-    `LEAST_ROUNDS` rounds. A brief call has one round with little work, or no round if the call has a time limit.
+    By default, there is one round. With repeated shortening, if round n was the last round that made the plan cheaper, there are at
+    most 2 n rounds. If windows of the lowest level can make refinements cheaper, repeated shortening has at least `LEAST_ROUNDS`
+    rounds. A brief call has one round with little work, or no round if the call has a time limit.
     """
     least = LEAST_ROUNDS if lasting(call) else 1
     if prices(call) > 1 and call.bound is None:
@@ -111,7 +111,7 @@ def cost(call: Call) -> float:
 
 
 def puts_aside(call: Call) -> bool:
-    """Return whether a step overwrites a value that no step has required; otherwise hardly any step is superfluous."""
+    """Return whether a step overwrites a value that no step has required; only in this case, superfluous steps are likely."""
     table, problem, names = call.table, call.problem, call.program.variables
     idle = set[Cell]()
     table.undo(0)
@@ -140,7 +140,7 @@ def puts_aside(call: Call) -> bool:
 
 
 def reordered(call: Call, work: int, advised: Callable[[Call], None], random: Random) -> None:
-    """Achieve the goals in other orders with bounded work; keep the cheapest steps, and continue from their order.
+    """Achieve the goals in other orders with bounded work; keep the cheapest steps, and vary the order that led to them.
 
     Only steps of the most abstract level are tried. Advice is used only for refinements, because advice for goals would lead to the
     same steps.

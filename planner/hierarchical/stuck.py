@@ -14,7 +14,7 @@ from confab.reasoner.limits import LimitError
 from confab.reasoner.symbols import Fact, Symbol
 
 QUESTIONS, LOOKED, AMOUNTS = 160, 100_000, 3
-"""Maximum number of examined values, of examined achievers, and of reported amounts."""
+"""Maximum number of examined values, maximum number of examined achievers, and maximum number of reported amounts."""
 
 
 def gave_up(call: Call, why: str) -> Reason:

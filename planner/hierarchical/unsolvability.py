@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from confab.planner.grounded.task import Task
 
 LOOKING = 1_800_000
-"""Work that is always allowed for the examination of all states, in states times relaxed operators."""
+"""Work that is always allowed for the examination of all states; the unit is one relaxed operator in one state."""
 FIRST_TESTS, AT_ONCE, PAIRS = 8_000, 20_000, 500_000
 """Maximum number of conditions that the search for a certificate tests.
 
-The three numbers are the limits before a search, in the paper's mode, and after failed searches.
+The first limit holds before a search, the second in the paper's mode, and the third after failed searches.
 """
 TEST = 8
 """Work of testing one condition, in the unit of `Workspace.effort`."""
@@ -110,8 +110,8 @@ def proved(problem: Problem, level: int, deadline: float | None = None) -> Task 
 def looked_at(task: Task, space: Workspace, before: int) -> int:
     """Raise `UnsolvableError` if no reachable state satisfies the goal; return the number of examined states.
 
-    The work is limited to the work of the searches so far. If the work of the searches doesn't suffice for twice `before`
-    states, no states are examined, and the function returns `before`.
+    The work is limited to the work of the searches so far. If this work doesn't suffice for twice `before` states, the function
+    examines no states and returns `before`.
     """
     state = max(len(task.owners), LEAST)
     most = max(LOOKING, space.worked) // state

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from confab.planner.grounded.task import Task
 
 PER_PRIMITIVE = 3
-"""For each saved primitive of mean cost, a shortened plan must lose fewer level-1 steps than this number."""
+"""A shortened plan must lose fewer level-1 steps than this number times the saved cost (in primitives of mean cost)."""
 KEPT = 1.5
 """Factor by which the cost must decrease if primitives replace steps of the most abstract level."""
 MOST_ROWS, OF_A_STEP = 20_000, 500
@@ -56,8 +56,9 @@ def windowed(call: Call, level: int, work: int) -> None:
 def cheaper(call: Call, level: int, work: int) -> list[Ground] | None:
     """Return a cheaper sequence of steps of a level for a call's plan, without refinements.
 
-    The steps also satisfy the preconditions that the upper levels impose on their changes, unless the plan violates these, or the
-    level with these preconditions is too large. Return None if no cheaper sequence is found, or if the level is too large.
+    The new steps also satisfy the preconditions that the upper levels impose on changes. There are two exceptions: the given plan
+    violates these preconditions, or the level with these preconditions is too large. Return None if no cheaper sequence is found,
+    or if the level is too large.
     """
     steps = [one for step in call.steps for part in parts(step, level) for one in part.together]
     if any(step.level != level for step in steps):
@@ -133,9 +134,9 @@ def primitives(steps: Sequence[RefinedStep]) -> list[RefinedStep]:
 def improves(problem: Problem, new: Plan, old: Plan, level: int) -> bool:
     """Return whether a new plan is cheaper than the old plan and violates no more conditions of upper levels.
 
-    The new plan must lose fewer than `PER_PRIMITIVE` steps of the most abstract level for each saved primitive of mean cost. If
-    primitives replace steps of a plan that consists of steps of the most abstract level, the new plan must be cheaper by the factor
-    `KEPT`.
+    For each saved primitive, the new plan must lose fewer than `PER_PRIMITIVE` steps of the most abstract level. The number of
+    saved primitives is the saved cost divided by the mean cost of a primitive. If the old plan has only steps of the most abstract
+    level, and primitives replace some of these steps, the new plan must be cheaper by the factor `KEPT`.
     """
     price, before = compared(problem, new.primitives), compared(problem, old.primitives)
     first, last = problem.domain.levels[0], problem.domain.levels[-1]

@@ -1,11 +1,11 @@
 """The common data of all searches of one call: the table of current values, the bound behaviours, and the budget.
 
-`table` contains the current values of all symbols; changes are made in place and can be undone. `forward` contains a function
-for each behaviour; given the arguments, it returns the changes, or None if the behaviour isn't applicable. `achieve` contains a
-function for each effect; given a symbol and a value, it yields the arguments with which the effect achieves the value. `keep`
-is a function of a symbol and its first value; it returns the required final value, or None if any value is allowed. The budget
-is the work of all searches, in units of about a microsecond. A search of a scope costs states times operators, and an expansion
-costs 100.
+`table` contains the current values of all symbols; changes are made in place and can be undone. `forward` contains a function for
+each behaviour; given the arguments, it returns the changes, or None if the behaviour isn't applicable. `achieve` contains a
+function for each effect; given a symbol and a value, it yields the arguments with which the effect achieves the value. `keep` is a
+function of a symbol and its first value; it returns the required final value, or None if any value is allowed. The budget is the
+work of all searches, in units of about a microsecond. The search of a scope costs the number of states times the number of
+operators; an expansion costs 100.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Workspace:
     most : int
         Maximum number of expansions of all searches together; `LimitError` is raised above this number.
     most_work : float
-        Maximum work in scopes, in states times operators; `LimitError` is raised above this work.
+        Maximum work in scopes (number of states times number of operators); `LimitError` is raised above this work.
     shortening : str
         Work for a shorter plan: "brief", "once" or "repeated" (`Limits.shortening`).
     dead_end_check : function
@@ -117,7 +117,7 @@ class Workspace:
     # ---------------------------------------------------------------------------------------------------- required values
 
     def refining(self, level: int, careful: bool = False) -> Keep:
-        """Return the function `keep` of required final values for the refinement of a step of a level.
+        """Return the function `keep` for the refinement of a step of a level; it gives the required final values of symbols.
 
         Symbols that the level sees must be unchanged. All other symbols must be at rest. A symbol without a rest value
         may have any final value; if `careful`, the symbol must be unchanged. A remembered symbol may become true.
@@ -132,7 +132,7 @@ class Workspace:
         return keep
 
     def keeping(self, kept: Mapping[Cell, str]) -> Keep:
-        """Return the function `keep` of required final values for steps towards a goal.
+        """Return the function `keep` for steps towards a goal; it gives the required final values of symbols.
 
         Achieved goals must hold, and all other symbols must be at rest.
         """
@@ -152,7 +152,7 @@ class Workspace:
         self._limited()
 
     def spend(self, level: int, counts: Counts, work: int) -> None:
-        """Count the search of a scope with its work in states times operators; raise `LimitError` if a limit is reached."""
+        """Count the work of searching a scope (states times operators); raise `LimitError` if a limit is reached."""
         self.counts[level].add(counts)
         self.expanded += counts.expanded
         self.worked += work

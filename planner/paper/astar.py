@@ -1,4 +1,4 @@
-"""A* as Algorithm 1 of the paper intends; the function f contains the cogency ranking score of eqs. (3) and (5).
+"""A* as intended by Algorithm 1 of the paper; the function f contains the cogency ranking score of equations (3) and (5).
 
 `g` is the cost of the behaviours from the start to a node. `h` is the estimated cost from a node to the goal: the number of
 situated object symbols that don't match the goal. `c` is the cogency term of the behaviour that led to a node, computed in the

@@ -17,7 +17,7 @@ from confab.reasoner.symbols import Problem, State, Symbol
 
 @dataclass(frozen=True)
 class PaperConstants:
-    """The constants of eqs. (2) and (5)."""
+    """The constants of equations (2) and (5) of the paper."""
 
     k: float = 3.0
     anticipated_length: int = 100  # N; the paper gives no value; a value near the plan's length degrades the search

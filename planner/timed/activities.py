@@ -20,7 +20,7 @@ from confab.reasoner.limits import check
 from confab.reasoner.symbols import Behavior, Problem, Times
 
 Key: TypeAlias = "tuple[str, object]"
-"""A read access: the value of a symbol (situation type and arguments), or the holders of a value."""
+"""A read access: the value of a symbol (situation type and arguments), or all symbols of a situation type with a given value."""
 
 
 class EventKind(Enum):
@@ -175,7 +175,7 @@ class _Course:
         self.made[number]["end"] = self.done(self.steps[number], self.piece(number).end, self.terms[number], True)
 
     def done(self, step: Step, piece: Behavior, terms: Arguments, put: bool) -> Access:
-        """Return the reads and changes of a part of a step; make the changes if `put`."""
+        """Return the reads and changes of a part of a step; if `put` is true, make the changes."""
         if not piece.preconditions and not piece.effects and not piece.amounts:
             return Access()
         facts = self.facts

@@ -1,4 +1,4 @@
-"""Scheduling of a plan: the necessary order of its primitives, a schedule, the actors of each turn, and the check."""
+"""Scheduling of a plan: the necessary order of its primitives, a schedule, the assignment of actors, and the final check."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ from confab.reasoner.limits import LimitError
 from confab.reasoner.symbols import Fact, Problem, Times
 
 SECONDS = 10.0
-"""Default time limit of scheduling, in seconds; the work of exchanging turns is also limited."""
+"""Default time limit of scheduling, in seconds; the search that exchanges turns of actors also has a limit of work."""
 
 
 @dataclass(frozen=True)
 class Timed:
     """The result of scheduling: a timed plan that the checker accepts, or the reason why no timed plan was found.
 
-    `late` is the time in seconds by which the best schedule misses windows and deadlines.
+    `late` is the time in seconds by which the best schedule misses time windows and deadlines.
     """
 
     plan: TimedPlan | None = None
@@ -60,7 +60,7 @@ def best_in_time(problem: Problem, plan: Plan, seconds: float | None = None, sho
     seconds : float, optional
         Time limit of the search for a short schedule.
     shorten : bool
-        Whether to search for a short schedule; otherwise return the first schedule that keeps all windows and deadlines.
+        Whether to search for a short schedule; otherwise return the first schedule that keeps all time windows and deadlines.
     """
     found = _best(problem, plan, seconds, shorten)
     if found.plan is None or not shorten:
@@ -163,7 +163,7 @@ def in_time(
 def _late(problem: Problem, order: Order, network: Network, choices: Choices, found: CandidateSchedule) -> Reason:
     """Return the reason why a schedule is late.
 
-    The reason names the times that the latest activity misses: windows of individuals, deadlines, or a fixed time.
+    The reason names what the activity with the greatest lateness misses: time windows of individuals, deadlines, or a fixed time.
     """
     i, times = found.begins.latest, problem.times or Times()
     one = order.activities[i]
@@ -193,13 +193,13 @@ def changed_by(activity: Activity) -> set[Cell]:
 
 
 def _written(window: tuple[Fraction, Fraction | None]) -> str:
-    """Return a window as text."""
+    """Return a time window as text."""
     low, high = window
     return f"from {float(low):g} s on" if high is None else f"from {float(low):g} to {float(high):g} s"
 
 
 def renamed_by(order: Order, turns: Sequence[Sequence[TurnId]]) -> dict[int, dict[str, str]]:
-    """For each activity, return the new names of the actors that other actors replace."""
+    """Return, for each activity, the replaced actors, each with the actor that takes its place."""
     renamed: dict[int, dict[str, str]] = {}
     for resource, line in enumerate(turns):
         for own, number in line:
@@ -213,7 +213,7 @@ def renamed_by(order: Order, turns: Sequence[Sequence[TurnId]]) -> dict[int, dic
 def timed_plan(
     problem: Problem, plan: Plan, order: Order, network: Network, choices: Choices, found: CandidateSchedule
 ) -> TimedPlan | None:
-    """Return a schedule as a timed plan with the actors of its turns.
+    """Return a schedule as a timed plan with the actors that the schedule assigns.
 
     Return None if the steps of some level have no sequential order.
     """

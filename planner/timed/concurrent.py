@@ -6,9 +6,9 @@ its plan is scheduled. If the plan has no schedule, a second search keeps a simp
 contains the events since the last time at which no step was running (the *window*). The second search drops nodes in which a
 step can't end in time. The heuristic is the length of a relaxed plan plus the number of running steps.
 
-The method follows Coles, Fox, Long and Smith, "Planning with problems requiring temporal coordination", AAAI 2008. The
-distinction of behaviours that needn't be split follows Coles et al., "Extending the use of inference in temporal planning as
-forwards search", ICAPS 2009.
+The method follows Coles, Fox, Long and Smith, "Planning with problems requiring temporal coordination", AAAI 2008. The rule that
+some behaviours needn't be split is due to Coles et al., "Extending the use of inference in temporal planning as forwards search",
+ICAPS 2009.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Shorter schedules and lower bounds, computed by the constraint solver CP-SAT of OR-Tools (the extra `time`).
 
-Turns are intervals that don't overlap on their resource. A turn that several actors could take has an optional interval on each
-of these actors; exactly one of the intervals is present. The solver chooses the order of the turns and the actor of each turn.
-The earliest begins of the activities follow from these choices.
+In the model of the solver, the turns of a resource are intervals that don't overlap. A turn that several actors could take has an
+optional interval on each of these actors; exactly one of the intervals is present. The solver chooses the order of the turns and
+the actor of each turn. The earliest begins of the activities follow from these choices.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ def shorter(
     order : Order
     network : Network
     choices : Choices
-        The choices of actors for the same order.
+        The choices of actors for `order`.
     found : CandidateSchedule
-        A schedule for the same order.
+        A schedule for `order`.
     bound : int
         A lower bound on the makespan.
     seconds : float

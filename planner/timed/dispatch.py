@@ -1,10 +1,10 @@
 """Execution of a timed plan whose primitives take shorter or longer than expected.
 
-A primitive begins when all events that its begin must follow have happened and a window allows it. So a delay shifts only the
-primitives that depend on the late primitive. The end of a primitive isn't controlled. If an end must follow another event, the
-primitive begins only if this order holds for all durations within the stated spread; otherwise the primitive is held back. When
-a primitive ends earlier or later than expected, turns that haven't begun are exchanged to keep deadlines and to shorten the
-makespan.
+A primitive begins when all events that must precede its begin have happened, and the time windows of its individuals allow the
+begin. So a delay shifts only the primitives that depend on the late primitive. The end of a primitive isn't controlled. If an end
+must follow another event, the primitive begins only if this order holds for all durations within the stated spread; otherwise the
+primitive is held back. When a primitive ends earlier or later than expected, turns that haven't begun are exchanged to keep
+deadlines and to shorten the makespan.
 
 Networks whose durations are observed, not controlled, are described by Vidal and Fargier, "Handling contingency in temporal
 constraint networks", Journal of Experimental and Theoretical Artificial Intelligence 11 (1999).

@@ -37,7 +37,7 @@ def choices_of(problem: Problem, plan: Plan, order: Order, network: Network) -> 
         A plan whose primitives are the steps of the order's activities.
     order : Order
     network : Network
-        The network of the same order.
+        The network of `order`.
     """
     actors = {one.actor: i for i, one in enumerate(order.resources) if one.actor is not None}
     every = _of_the_classes(problem, actors)
@@ -76,7 +76,7 @@ def exchanged(problem: Problem, plan: Plan, renamed: Mapping[int, Mapping[str, s
     problem : Problem
     plan : Plan
     renamed : mapping of int to mapping of str to str
-        The new name of each replaced actor, by the number of the primitive.
+        The new actor in place of each replaced actor, by the number of the primitive.
     """
     numbers = {step.path: i for i, step in enumerate(plan.primitives)}
 

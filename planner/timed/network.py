@@ -18,7 +18,7 @@ from confab.planner.timed.order import BEGIN, END, Edge, Order
 Arc = tuple[int, int, int]
 Window = tuple[int, int | None]
 ALWAYS: tuple[Window, ...] = ((0, None),)
-"""The windows of an activity that can take place at any time."""
+"""The time windows of an activity that can take place at any time."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Network:
     def ends(self, i: int, begin: int, lasts: int) -> list[int]:
         """Return the latest ends that the latest times, the window and the fixed time of an activity allow.
 
-        An activity that begins in a window also ends in this window.
+        An activity that begins in a time window also ends in this time window.
         """
         fixed = self.at[i]
         found = [by if which == END else by + lasts for which, by in self.latest[i]]
@@ -191,7 +191,7 @@ def earliest(
 
 
 def _only_forward(arcs: Sequence[Sequence[tuple[int, int]]], cyclic: set[int]) -> bool:
-    """Return whether all arcs between activities of cycles require a later begin, so that no begins satisfy a cycle.
+    """Return whether every arc within a cycle requires a later begin; if so, no begins satisfy the cycle.
 
     `cyclic` contains the activities of cycles and all activities after them.
     """
@@ -260,9 +260,9 @@ def _settled(
 
 
 def _fitting(windows: Sequence[Window], begin: int, lasts: int) -> int:
-    """Return the first time, not before `begin`, at which an activity fits into a window.
+    """Return the first time, not before `begin`, at which an activity fits into one of its time windows.
 
-    If the activity fits into no window, return the begin of the last window, or `begin` if `begin` is later.
+    If the activity fits into no time window, return the begin of the last time window, or `begin` if `begin` is later.
     """
     for low, high in windows:
         first = max(low, begin)

@@ -24,7 +24,7 @@ from confab.reasoner.symbols import FALSE, Problem, Times
 
 BEGIN, END = 0, 1
 Edge = tuple[int, int, int, int]
-"""A precedence: an activity, its begin (0) or end (1), another activity, and its begin or end, which comes later."""
+"""A precedence: an activity and its begin (0) or end (1), then the later activity and its begin or end."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Order:
 
 @dataclass(frozen=True)
 class _Record:
-    """An access to a symbol by an activity, from the begin or end `low` to the begin or end `high` of the activity."""
+    """An access of an activity to a symbol, from the event `low` to the event `high`; both are the begin or the end."""
 
     activity: int
     low: int
@@ -133,7 +133,7 @@ def order_of(problem: Problem, activities: Sequence[Activity], events: Iterable[
 def _records(
     activities: Sequence[Activity], events: Iterable[StepEvent]
 ) -> tuple[dict[Cell, list[_Record]], dict[Key, list[_Record]], dict[int, int], dict[int, int]]:
-    """Return the accesses to each symbol, the accesses to holders of each value, and the positions of begins and of ends."""
+    """Return the accesses to each symbol, the look-ups of the symbols with each value, and the positions of begins and of ends."""
     cells: dict[Cell, list[_Record]] = defaultdict(list)
     values: dict[Key, list[_Record]] = defaultdict(list)
     starts: dict[int, int] = {}
@@ -259,7 +259,7 @@ def _chained(
 def _touching(
     records: Mapping[Cell, Sequence[_Record]], values: Mapping[Key, Sequence[_Record]], ends: Mapping[int, int]
 ) -> Iterator[Edge]:
-    """Yield the edges between a read access to the holders of a value and the changes of these holders."""
+    """Yield the edges between each look-up of all symbols with a value and the changes from or to this value."""
     if not values:
         return
     touches: dict[Key, list[_Record]] = defaultdict(list)
@@ -309,7 +309,7 @@ def _windows(times: Times, activities: Sequence[Activity]) -> dict[int, tuple[tu
 def common(
     one: Sequence[tuple[Fraction, Fraction | None]], other: Sequence[tuple[Fraction, Fraction | None]]
 ) -> tuple[tuple[Fraction, Fraction | None], ...]:
-    """Return the intersections of the windows of two sets.
+    """Return the intersections of two sets of time windows.
 
     >>> common([(Fraction(0), Fraction(9))], [(Fraction(5), None)])
     ((Fraction(5, 1), Fraction(9, 1)),)

@@ -112,7 +112,7 @@ def duration_of(problem: Problem, behavior: Behavior, arguments: Arguments, fact
 
 
 def actors_of(problem: Problem, behavior: Behavior, arguments: Arguments, resting: frozenset[str]) -> tuple[str, ...]:
-    """Return the actors that the behaviour of a step names, otherwise the first argument in `resting`.
+    """Return the actors that the behaviour of a step names; if it names none, return the first argument in `resting`.
 
     `resting` is the result of `default_actors`.
     """

@@ -11,7 +11,7 @@ from confab.planner.plan import Plan, Step
 from confab.reasoner.names import brief, known_as
 
 THESE_STEPS = "these steps"
-"""The name of a lower bound on all schedules of the same steps.
+"""The name of the lower bound that holds for all schedules of the same steps.
 
 The schedules keep the order of conflicting steps. Turns may have any order and any possible actor.
 """
@@ -50,7 +50,7 @@ class TimedPlan:
     bounds : str
         The schedules to which the bound applies: `THESE_STEPS`.
     least : Fraction
-        Lower bound on the makespan of every plan, also with other steps, in seconds; 0 if it wasn't computed.
+        Lower bound on the makespan of every plan of the problem, whatever its steps, in seconds; 0 if it wasn't computed.
     scheduler : str
         The name of the scheduler.
     arcs : tuple of (int, int)

@@ -21,7 +21,7 @@ ROUNDS = 100
 MOST_ARCS = 400_000
 """Maximum number of arcs that exchanges of turns process."""
 TABU = 8
-"""Number of exchanges during which the search doesn't undo an exchange."""
+"""Number of further exchanges during which the search doesn't undo an exchange."""
 
 TurnId = tuple[int, int]
 """The number of a resource, and the number of a turn of this resource."""
@@ -63,7 +63,7 @@ def shortest(
     ----------
     order : Order
     network : Network
-        The network of the same order.
+        The network of `order`.
     choices : Choices
     until : float
         The end of the search on the clock of `perf_counter`.

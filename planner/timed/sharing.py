@@ -39,13 +39,13 @@ from confab.reasoner.timing import timing_of
 MOST_CREWS = 64
 """Maximum number of crews."""
 MOST_WORK = 20_000_000
-"""Maximum work of sharing, in states times operators (about a microsecond each)."""
+"""Maximum work of sharing; the unit is one operator in one state, about a microsecond."""
 PLANNING, SCHEDULING = 2_500, 60
-"""Work of planning a stretch without its searches, and work of scheduling a primitive, in states times operators."""
+"""Work of planning a stretch without its searches, and work of scheduling a primitive; the unit is one operator in one state."""
 BARREN = 150
 """Maximum number of successive changes without a better schedule."""
 BUSY = Fraction(103, 100)
-"""A schedule isn't improved further if the actors' total time is at most this number times their total work."""
+"""A schedule isn't improved further if the makespan times the number of actors is at most this number times the actors' work."""
 MOST_KNOWN = 4
 """Maximum number of known sequences of steps that are tried for a stretch."""
 MOST_COMPILED = 200
@@ -59,7 +59,7 @@ the critical path. `EARLY` is the probability that a late step becomes an early 
 MOST_FAILED = 2
 """Number of failures after which the planner searches no further steps for a task."""
 EXPANSIONS, WORK = 500, 200_000
-"""Maximum number of expansions for a stretch, and maximum work of the searches for a stretch, in states times operators."""
+"""Maximum number of expansions for a stretch, and maximum work of its searches; the unit is one operator in one state."""
 
 State: TypeAlias = "dict[Symbol, str]"
 Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
@@ -198,7 +198,7 @@ class _Search:
     work: int = 0
     most: int = MOST_WORK
     known: dict[tuple[Task, frozenset[Aim]], list[tuple[Step, ...]]] = field(default_factory=dict)
-    """The known steps of each task after the same early steps; the planner tries known steps before a search for other steps."""
+    """Known sequences of steps for each task after the same early steps; the planner tries these sequences before it searches."""
     failed: Counter[Task] = field(default_factory=Counter)
     """The number of times that no steps were found for a task, by task."""
     compiled: dict[Crew, tuple[Problem, Compiled]] = field(default_factory=dict)
@@ -337,7 +337,7 @@ class _Search:
     def built(self, tasks: Sequence[Task], like: _Sequence | None) -> _Sequence | None:
         """Return the sequence of tasks with stretches and schedule, or None if a task isn't achieved.
 
-        The sequence reuses the stretches of the common first tasks of the sequence `like`.
+        The sequence reuses the stretches of the first tasks that it has in common with the sequence `like`.
         """
         same = 0
         if like is not None:

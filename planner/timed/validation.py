@@ -1,4 +1,4 @@
-"""The checker of timed plans; it shares with the scheduler only the pieces of behaviours (docs/levels.md, "In time").
+"""The checker of timed plans; it shares with the scheduler only the division of behaviours into pieces (docs/levels.md, "In time").
 
 The checker simulates the primitives on symbols at their times. At each instant, ends come before begins. Every condition is
 evaluated at the times that its span requires. A condition with the span `throughout` is evaluated again after every event. A value
@@ -58,7 +58,7 @@ class _Running:
 
 
 class _Watched(Facts):
-    """A view of facts that records which symbols a condition reads, and the values whose holders a condition reads."""
+    """A view of facts that records two kinds of reads: the value of a symbol, and all symbols with a given value."""
 
     def __init__(self, problem: Problem, rules: BehaviorReader) -> None:
         super().__init__(problem, problem.initial, rules)
@@ -235,8 +235,8 @@ class _Clock:
     def foreign(self, one: _Running, changed: Sequence[Cell], time: Fraction) -> Iterator[Fault]:
         """Yield a fault if a step conflicts with another step.
 
-        A step conflicts with another step if the step reads or changes a pending value of the other step. A step also
-        conflicts if the other step accessed the same symbol less than the separation time before.
+        A step conflicts with another step if the step reads or changes a pending value of the other step. A step also conflicts if
+        another step has accessed the same symbol less than the minimum separation ago.
         """
         read, values = set(self.facts.cells), set(self.facts.values)
         for other in self.running.values():
@@ -273,7 +273,7 @@ class _Clock:
     def in_the_end(self) -> Iterator[Fault]:
         """Yield a fault for each goal that isn't reached in time.
 
-        Also yield a fault for each symbol whose last change is made by a different step than in the sequential plan.
+        Also yield a fault for each symbol whose last change comes from another step than in the sequential plan.
         """
         for symbol, wanted in self.problem.goal.items():
             got = self.facts.value(symbol.situation, symbol.arguments) or FALSE
