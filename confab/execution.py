@@ -463,7 +463,7 @@ def carry_out(
 def _whole_problem(scene: Known, plan: AnyPlan | None, goals: Sequence[str]) -> Problem:
     """Return the problem of the whole scene, with the given goals or, if `plan` is a result, with the goals of the result.
 
-    The part of the scene from which the first plan was made may not suffice for plans that are made during execution.
+    The part of the scene that was read for the first plan may be too small for plans that are made during execution.
     """
     whole = getattr(plan, "in_whole_scene", None)
     return with_goals(scene.reading.problem, goals) if whole is None else whole().problem

@@ -172,7 +172,7 @@ def stem(word: str) -> str:
 
 @cache
 def meanings() -> Mapping[str, frozenset[int]]:
-    """Return a mapping of the stem of each word to the numbers of the lines of `MEANINGS` that contain the word."""
+    """Return, for the stem of each word, the numbers of the lines in `MEANINGS` that contain the word."""
     lines = [[*map(stem, line.split())] for line in MEANINGS.strip().splitlines()]
     words = {word for line in lines for word in line}
     return {word: frozenset(i for i, line in enumerate(lines) if word in line) for word in words}

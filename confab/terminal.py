@@ -206,7 +206,7 @@ PLAINER = (
     (r"([-\d.e+]+) is not in the range x>(=?)([-\d.e+]+)$", r"\1; wanted a number >\2 \3"),
     (r"([-\d.e+]+) is not in the range ([-\d.e+]+)<=x<=([-\d.e+]+)$", r"\1; wanted a number from \2 to \3"),
 )
-"""Patterns of messages about numbers from the library click, each with a plainer wording."""
+"""Patterns of messages of the library click about numbers, each with a plainer wording."""
 
 
 def _usage(error: Any) -> str:

@@ -302,7 +302,7 @@ class Afterwards:
     def linear(
         self, expression: Expression, operation: str = "increase", scaled: Scaled = lambda by: by
     ) -> list[Term] | None:
-        """Return the changing amounts in a linear expression; the effects must only increase or decrease these amounts.
+        """Return the changing amounts in a linear expression, if effects only increase or decrease these amounts.
 
         Parameters
         ----------

@@ -52,7 +52,7 @@ Properties: TypeAlias = "dict[str, list[str]]"
 STRINGS = ("sign", "change", "aggregate")
 """Properties whose values are words."""
 LITERALS = {"negated": "boolean", "amount": "decimal", "index": "integer"}
-"""Properties whose values are literals of other datatypes, with the datatypes."""
+"""Properties whose values are literals but not words, each with the datatype of its values."""
 SIGNS = ("+", "-", "*", "/")
 DEEPEST = 50
 """Maximum depth of nested conditions and calculations. Conjunctions (`:AllOf`) don't count as levels."""

@@ -115,7 +115,7 @@ def page_data(
 
 
 def page_labels(scene: Known, problem: Problem) -> Labels:
-    """Return the labels of the terms of a problem, of furniture and of robots."""
+    """Return the labels of a problem's terms, of furniture and of robots."""
     from confab.labels import labels_of
 
     body = embodiment_of(scene)

@@ -32,9 +32,9 @@ def map_of(ground: Ground, timeline: Timeline, labels: Labels) -> MapData:
 def _things(ground: Ground, timeline: Timeline, labels: Labels) -> list[Thing]:
     """Return the objects on the map, each with its places in time.
 
-    The place of an object is the value of one of its symbols: the first value of the symbol is a place on the map, and its
-    situation type has no rest value. (Positions of hands have a rest value.) If an object has several symbols of this kind, the
-    map uses the symbol whose values are on the map for the longest time.
+    The place of an object is the value of a symbol of the object. The first value of this symbol is a place on the map, and the
+    symbol's situation type has no rest value. (Positions of hands have a rest value.) If an object has several symbols of this
+    kind, the map uses the symbol whose values are on the map for the longest time.
     """
     situations = timeline.problem.domain.situations
     found: dict[str, tuple[float, Thing]] = {}

@@ -127,10 +127,10 @@ def _timed(
 class _Candidate:
     """The tuples whose contribution to a total may be changed by one effect on one symbol of the aggregate.
 
-    `effect` is a copy of the effect with its own variables. `named` are the arguments of the symbol and `value` its value (None for
-    an amount). If `before` is true, the tuples contain the value that the symbol has before the effect, otherwise the value after
-    the effect. If the aggregated number is linear and the effect changes only one term of this number, `term` is this term. Such an
-    effect doesn't change which tuples contribute to the total.
+    `effect` is a copy of the effect in which the variables have new names. `named` are the arguments of the symbol and `value` its
+    value (None for an amount). If `before` is true, the tuples contain the value that the symbol has before the effect, otherwise
+    the value after the effect. If the aggregated number is linear and the effect changes only one term of this number, `term` is
+    this term. Such an effect doesn't change which tuples contribute to the total.
     """
 
     effect: Effect

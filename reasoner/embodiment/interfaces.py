@@ -72,7 +72,7 @@ class Meaning:
 
 @dataclass(frozen=True)
 class Reading:
-    """The field of an entity in the robot's world model that contains the value of a situation type's symbol."""
+    """A field in the robot's world model that contains the value of a symbol."""
 
     situation: str
     field: str

@@ -59,7 +59,7 @@ def threshold_outside(embodiment: Embodiment) -> Iterator[Flaw]:
 
 
 def feature_off_its_part(embodiment: Embodiment) -> Iterator[Flaw]:
-    """Yield features whose part is farther away than the opening of the widest hand."""
+    """Yield features whose distance to their nearest part exceeds the opening of the widest hand."""
     openings = [2 * hand.opening for robot in embodiment.robots for hand in robot.hands]
     for link in _links(embodiment) if openings else ():
         own = {part.name: part for part in link.parts if part.kind != "mesh"}

@@ -35,7 +35,7 @@ PALETTE: tuple[Color, ...] = (
     (0.20, 0.55, 0.90, 1.0),
     (0.55, 0.75, 0.20, 1.0),
 )
-"""Colours of the fillings for which no colour is stated, in declared order."""
+"""Colours for fillings without a stated colour; the fillings get these colours in declared order."""
 
 
 def read_embodiment(

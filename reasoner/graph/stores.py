@@ -257,7 +257,7 @@ def connect(url: str, scene: str | None = None, *, timeout: float = TIMEOUT, ret
 
 
 def _scene(url: str, scene: str | None, imports: Mapping[str, set[str]]) -> str:
-    """Return the requested scene; by default, the only ontology with imports that no other ontology imports."""
+    """Return the requested scene; by default, the only ontology that has imports and isn't imported itself."""
     if scene is not None:
         if scene not in imports:
             raise KnowledgeError(

@@ -17,9 +17,9 @@ any other function              situation type whose values are amounts, unless 
 goal that isn't a fact          precondition of the behaviour ``REACH_GOAL``, whose effect is the goal
 ==============================  ================================================================
 
-Invariant synthesis finds mutually exclusive predicates. Of mutually exclusive predicates, at most one holds for an object
-initially, and an action that adds one of them for an object deletes another one. Helmert, "Concise finite-domain representations
-for PDDL planning tasks", Artificial Intelligence 173 (2009), section 5, without its search for inequalities.
+Invariant synthesis finds mutually exclusive predicates. At most one of several mutually exclusive predicates holds for an object
+initially. An action that adds one of these predicates for an object deletes another one. Helmert, "Concise finite-domain
+representations for PDDL planning tasks", Artificial Intelligence 173 (2009), section 5, without its search for inequalities.
 """
 
 from __future__ import annotations

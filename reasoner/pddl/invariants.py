@@ -1,10 +1,10 @@
 """Invariant synthesis for a PDDL domain.
 
-An invariant is a set of predicates of which at most one fact holds for each object in every reachable state. The predicates of an
-invariant form one state variable of the object. The search for an invariant starts with a guess that contains one changing
-predicate. The guess is proved if every action that adds a fact of the invariant also deletes a fact of the invariant. If the
-proof fails for an action, a predicate that the action deletes is added to the guess. For example, the predicate *in* is added to
-the predicate *at*.
+An invariant is a set of predicates; in every reachable state, at most one fact with these predicates holds for each object. The
+predicates of an invariant form one state variable of the object. The search for an invariant starts with a guess that contains one
+changing predicate. The guess is proved if every action that adds a fact of the invariant also deletes a fact of the invariant. If
+the proof fails for an action, a predicate that the action deletes is added to the guess. For example, the predicate *in* is added
+to the predicate *at*.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ actions, derived predicates, action costs, timed initial literals, goal preferen
 file, line and column.
 
 The parser of unified-planning isn't used, because that parser reports an undefined type as a ``KeyError`` without a message,
-states no position for half of the errors, and takes .2 to .5 s for problems that this parser reads in 2 ms.
+states no position for half of the errors, and takes 0.2 to 0.5 s for problems that this parser reads in 2 ms.
 
 McDermott et al., "PDDL: the planning domain definition language", 1998; Fox and Long, "PDDL2.1", JAIR 20 (2003).
 """

@@ -1,1 +1,2 @@
-"""Reading of problems, quantified behaviours and affordances from the graph, limited to the task's part of a scene."""
+"""Reading of problems, quantified behaviours and affordances from the graph, and selection of the part of a scene that a task
+needs."""

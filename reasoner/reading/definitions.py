@@ -118,7 +118,10 @@ class Definitions:
     concluded: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
     def changes(self, iri: str) -> bool:
-        """Return whether conditions replace a class: its members change, or OWL 2 RL doesn't find all of its members."""
+        """Return whether conditions replace a class.
+
+        The members of such a class change, or OWL 2 RL doesn't find all of them.
+        """
         return iri in self._changing
 
     @cached_property

@@ -217,8 +217,8 @@ def with_derived_goal(problem: Problem, task: str, name: str, wanted: Condition)
 
     The symbol is true if the condition `wanted` holds.
 
-    The argument of the symbol for the goal is the task. A derived situation type turns a goal with alternatives or quantifiers
-    into a fact like other goals.
+    The symbol that represents the goal has the task as its argument. A derived situation type turns a goal with alternatives or
+    quantifiers into a fact like other goals.
     """
     domain = problem.domain
     names = [name, *(f"{name}_{number}" for number in range(2, len(domain.situations) + 3))]

@@ -255,8 +255,8 @@ class _Scope:
 def _scopes(conditions: Sequence[Condition], kinds: Mapping[str, str]) -> list[_Scope]:
     """Return the conjunctions that conditions contain, including nested conjunctions.
 
-    The first conjunction contains the positive conditions. Each further conjunction consists of the positive conditions and an
-    alternative or a negated conjunction.
+    The first conjunction contains the positive conditions. Each further conjunction adds an alternative or a negated conjunction to
+    the positive conditions.
     """
     leaves: list[Condition] = []
     groups: list[tuple[tuple[Condition, ...], Mapping[str, str]]] = []

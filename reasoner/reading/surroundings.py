@@ -28,8 +28,8 @@ from confab.reasoner.symbols import (
 from confab.reasoner.vocabulary import CORE, TYPE
 
 Shape: TypeAlias = "tuple[tuple[str, tuple[bool, ...]], ...]"
-"""The form of a lookup's conditions: for each condition, the IRI of a situation type or relation, and a flag per argument that
-tells whether the argument is the individual that is looked up.
+"""The form of a lookup's conditions. For each condition, it has the IRI of a situation type or relation, and a flag for each
+argument: the flag tells whether the argument is the individual that is looked up.
 """
 
 

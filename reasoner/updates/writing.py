@@ -39,7 +39,11 @@ Spell = Callable[[str], str]
 
 @dataclass(frozen=True)
 class Situations:
-    """The value property of each situation type that has one, and the situation types with several values per subject (`pairs`)."""
+    """Properties of situation types that determine their notation in an update.
+
+    `properties` maps a situation type to its value property, if it has one. `pairs` contains the situation types with several
+    values per subject.
+    """
 
     properties: Mapping[str, str]
     pairs: Collection[str]
