@@ -506,8 +506,8 @@ class Result(metaclass=RightNames):
             The alternative. An alternative is a goal like ``cup2 LOCATION location8`` or ``cup2 LOCATION location8 by
             left_hand``, or a behaviour like ``B2_PICK right_hand cup1`` or ``B2_PICK hand=right_hand``.
         instead : Step, int, str or path, optional
-            The step that the behaviour would replace. By default, the step is the most similar of the steps in whose place the
-            behaviour is applicable.
+            The step that the behaviour would replace. By default, it is the most similar step in whose place the behaviour is
+            applicable.
         seconds : float, optional
             Time limit of the whole call.
         """

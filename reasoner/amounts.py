@@ -100,7 +100,8 @@ COMPARING: Mapping[str, Callable[[Number, Number], bool]] = {
 MORE, LESS = "more", "less"
 """The two directions in which an amount may have to change to satisfy its goal."""
 OPERATIONS = ("assign", "scale", "increase", "decrease")
-"""Operations of effects on amounts, in the order in which the effects of one behaviour on one symbol are applied."""
+"""Operations of effects on amounts. If several effects of a behaviour change one symbol, their operations are applied in this
+order."""
 
 
 def inside(expression: Expression) -> Iterator[Expression]:

@@ -1,7 +1,7 @@
 """Stratification of derived situation types: the order in which these types are computed.
 
 Mutually dependent types are computed together. A situation type may depend on the negation of another type only if the other type
-is computed earlier; otherwise its value would be undefined or ambiguous.
+is computed earlier; otherwise, the first type's value would be undefined or ambiguous.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ def write_whole(
 ) -> None:
     """Write a file atomically: readers see the old or the new content, even after a crash.
 
-    The errors are those of `written_whole`.
+    The function raises the errors of `written_whole`.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def check_folder(path: Path) -> None:
 def made_folder(path: str | Path) -> Path:
     """Create a folder, and the folder that contains it, unless both exist; return the path.
 
-    The errors are those of `check_folder`.
+    The function raises the errors of `check_folder`.
     """
     check_folder(Path(path))
     Path(path).parent.mkdir(exist_ok=True)

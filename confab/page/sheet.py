@@ -1,4 +1,4 @@
-"""Controls on the page, with which the user changes facts, goals and interventions, and the plans that result from the changes."""
+"""Controls on the page for changes of facts, goals and interventions, and the plans that result from these changes."""
 
 from __future__ import annotations
 

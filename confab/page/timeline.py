@@ -1,7 +1,7 @@
 """The timeline of a run: the primitives of a plan and the values of symbols, with their begin and end times.
 
-In the timeline of a plan without a schedule, each primitive takes one unit of time. The times of rollouts and episodes are those
-of the world's clock.
+In the timeline of a plan without a schedule, each primitive takes one unit of time. Rollouts and episodes have the times of the
+world's clock.
 """
 
 from __future__ import annotations

@@ -307,7 +307,7 @@ def unknown_prefixes(graph: KnowledgeGraph, query: str) -> list[str]:
 
 
 def core_names(graph: KnowledgeGraph, query: str) -> str:
-    """Return a query in which ``:Behavior`` denotes the class of the core, unless the scene's own namespace ``:`` has this name."""
+    """Return a query in which ``:Behavior`` denotes the core's class, unless the scene's own namespace ``:`` has this name."""
     own = graph.spoken.get("", CORE)
     if own == CORE or "" in DECLARED.findall(query):
         return query

@@ -52,7 +52,7 @@ def read(size: int) -> bytes:
 
 
 def forked(store: ox.Store, question: tuple[Any, ...], setup: dict[str, Any]) -> bytes:
-    """Return the pickled answer of a forked process, or its exit status if it ended without an answer."""
+    """Return the pickled answer of a forked process, or the exit status of a process that ended without an answer."""
     ours, theirs = os.pipe()
     child = os.fork()
     if child == 0:

@@ -12,9 +12,9 @@ from confab.reasoner.symbols import Behavior, Condition, Problem, ValueCondition
 class Kept:
     """The extra predicates that an export declares for the negative preconditions of its behaviours.
 
-    `contrary` maps a situation type to the values for which the export needs a predicate ``not_TYPE`` of an individual and the
-    value. `free` maps a class and a situation type to the values that at most one individual can have at a time. For these values,
-    a predicate ``no_CLASS_has_TYPE`` of the value suffices.
+    `contrary` maps a situation type to values; for each of these values, the export needs a predicate ``not_TYPE``, whose arguments
+    are an individual and the value. `free` maps a class and a situation type to values that at most one individual can have at a
+    time; for each of these values, the export needs only a predicate ``no_CLASS_has_TYPE``, whose argument is the value.
     """
 
     def __init__(self, problem: Problem, behaviors: Sequence[Behavior], words: Vocabulary) -> None:

@@ -295,7 +295,7 @@ def _why_not(iri: str, parts: Iterable[str], file: _File, schema: Schema) -> str
 
 
 def _replaced(triple: tuple[object, ox.NamedNode, object], is_term: bool) -> bool:
-    """Return whether a triple can be dropped: it only labels a condition, or the other form of the behaviour expresses it."""
+    """Return whether a triple can be dropped, because it only labels a condition or because the other form expresses it."""
     predicate = triple[1].value
     return (
         predicate == TYPE or predicate.startswith(CORE) or (not is_term and predicate in (LABEL, SKOS + "definition"))
