@@ -12,7 +12,7 @@ from confab.planner.solve import Mode
 from confab.planning import Result
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import within
-from confab.scene import Scene, load
+from confab.scene import Scene, load, read
 
 ROWS, ROLLOUTS = 1_000, 20
 """Maximum number of rows of a query, and maximum number of rollouts of a verification."""
@@ -63,7 +63,7 @@ def scene_of(folder: Path, name: str) -> Scene:
     for file in sorted(path.parent.iterdir()):  # the scene may import these files by their names
         if file.suffix in ontology.SUFFIXES:
             refuse_outside(file, file)
-    scene = load(path)
+    scene = read(path)
     for file in scene.knowledge.files.values():
         refuse_outside(path, file)
     return with_current_reach(scene, lambda text: None)

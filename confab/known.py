@@ -319,10 +319,13 @@ class Known(metaclass=RightNames):
         False
         """
         with within(limits.seconds if limits is not None else None):
-            from confab.reasoner.graph.query_process import ask
+            from confab.reasoner.graph.query_process import ask, unheard_of
 
             sparql = sparql_of(sparql, self.knowledge)
             kind, columns, found = ask(self._asked(sparql, limits), sparql, limits)
+            nothing = not found if kind == "truth" else all(_is_zero(term) for row in found for term in row)
+            if nothing and not self.knowledge.remote and (unheard := unheard_of(self.knowledge, sparql)):
+                log.warning("confab: the scene has no term %s", ", ".join(unheard))
         if kind == "truth":
             return Table(("answer",), ((str(found).lower(),),), truth=found)
         columns = ["subject", "predicate", "object"] if kind == "triples" else columns

@@ -37,28 +37,26 @@ def with_current_reach(scene: S, report: Callable[[str], None]) -> S:
     of the missing statement. The reach facts of shipped scenes are always up to date.
     """
     graph = scene.knowledge
-    if graph.remote or graph.faults or not graph.select(ROBOTS):
+    shipped = graph.path is not None and graph.path.is_relative_to(ontology.ROOT)
+    if shipped or graph.remote or graph.faults or not graph.select(ROBOTS):
         return scene
-    if graph.path is None:  # a scene read from text has no file of reach facts
-        try:
-            return with_reach(scene)
-        except (KnowledgeError, ImportError) as error:
-            report(f"the reach of the hands isn't known: {error}")
+    if graph.path is not None:  # a scene read from text has no file of reach facts
+        file = graph.path.with_name(f"{graph.path.stem}.reach.ttl")
+        own = [path for path in graph.files.values() if not path.is_relative_to(ontology.ROOT)]
+        if file.is_file() and file.stat().st_mtime >= max(path.stat().st_mtime for path in own):
             return scene
-    if graph.path.is_relative_to(ontology.ROOT):
-        return scene
-    file = graph.path.with_name(f"{graph.path.stem}.reach.ttl")
-    own = [path for path in graph.files.values() if not path.is_relative_to(ontology.ROOT)]
-    if file.is_file() and file.stat().st_mtime >= max(path.stat().st_mtime for path in own):
-        return scene
-    report("computing the reach of the hands")
+        report("computing the reach of the hands")
     try:
         reached = with_reach(scene)
-        if file.is_file():
+        if graph.path is not None and file.is_file():
             file.touch()
         return reached
-    except (KnowledgeError, OSError) as error:
+    except (KnowledgeError, OSError, ImportError) as error:
+        from confab.reasoner.embodiment.reach import reach_hash
+
         report(f"the reach of the hands isn't known: {error}")
+        if isinstance(error, ImportError) and reach_hash(graph) is None:
+            graph.faults.append(f"the reach of the hands isn't known, so no plan can be found: {error}")
         return scene
 
 

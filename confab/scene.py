@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from os import PathLike
@@ -305,8 +306,9 @@ def load(source: str | Path | rdflib.Graph | Scene | Sequence[str | Path], *, sc
     Parameters
     ----------
     source : str, Path, rdflib.Graph, Scene, or sequence of str or Path
-        The source of the scene. If several files are given, the scene is the first file that no other file imports. A scene is
-        returned unchanged. A graph is copied, and may import shipped ontologies.
+        The source of the scene. If several files are given, the scene is the first file that no other file imports. A graph is
+        copied, and may import shipped ontologies. If the scene has a robot's body, and its reach facts are missing or outdated,
+        the reach facts are computed and written to ``SCENE.reach.ttl`` beside the scene.
     scene : str, optional
         IRI of the scene at an endpoint with several scenes.
 
@@ -322,6 +324,13 @@ def load(source: str | Path | rdflib.Graph | Scene | Sequence[str | Path], *, sc
     >>> load("beverage-serving").query("SELECT ?o ?l WHERE { ?o k:location ?l } ORDER BY ?o")[0]
     ('bottle1', 'location4')
     """
+    from confab.reaching import with_current_reach
+
+    return with_current_reach(read(source, scene=scene), logging.getLogger(__name__).info)
+
+
+def read(source: str | Path | rdflib.Graph | Scene | Sequence[str | Path], *, scene: str | None = None) -> Scene:
+    """Load a scene as `load` does, but without computing its reach facts."""
     begin = perf_counter()
     if isinstance(source, str) and source.startswith(("http://", "https://")):
         from confab.reasoner.graph.stores import connect

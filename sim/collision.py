@@ -241,8 +241,8 @@ def column(heights: Array, radii: Array, bottom: float) -> Spheres:
     Ascending `heights` and `radii` give the outline of the body. A sphere is as wide as the body at the sphere's centre, or a
     ring of smaller spheres, if the wide sphere would protrude below the body.
 
-    >>> column(np.array([0.0, 0.1]), np.array([0.03, 0.03]), 0.0).centers[:, 2].round(3).tolist()
-    [0.02, 0.04, 0.06, 0.08]
+    >>> column(np.array([0.0, 0.1]), np.array([0.03, 0.03]), 0.0).centers[:, 2].round(3).tolist()  # a ring at 0.02
+    [0.02, 0.04, 0.06, 0.08, 0.02, 0.02, 0.02, 0.02]
     """
     top = float(heights[-1])
     ends = [min(float(np.interp(z, heights, radii)) * 2 / 3, (top - bottom) / 2) for z in (bottom, top)]

@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 def load_scene(source: str, iri: str | None = None) -> Scene:
     """Load a scene, and compute its reach facts if it has a robot's body; the source ``-`` is standard input."""
     from confab.reaching import with_current_reach
-    from confab.scene import load, load_text
+    from confab.scene import load_text, read
 
     with progress(f"reading {'stdin' if source == '-' else source}"):
-        scene = load_text(sys.stdin.buffer.read()) if source == "-" else load(source, scene=iri)
+        scene = load_text(sys.stdin.buffer.read()) if source == "-" else read(source, scene=iri)
     return with_current_reach(scene, remark)
 
 

@@ -22,10 +22,11 @@ from time import perf_counter
 from confab.planner.hierarchical.agenda import Agenda
 from confab.planner.hierarchical.call import Call, fresh_call
 from confab.planner.hierarchical.detours import without_detours
-from confab.planner.hierarchical.windows import improves, lower_bound, primitives, windowed
+from confab.planner.hierarchical.windows import improves, lower_bound, primitives, refined, regroupings, windowed
 from confab.planner.plan import Plan
 from confab.planner.plan_costs import compared
 from confab.planner.transitions import Cell, arguments_of, key_of
+from confab.planner.validation import validate
 from confab.reasoner.limits import LimitError
 from confab.reasoner.symbols import Symbol, ValueCondition
 
@@ -184,10 +185,18 @@ def neighbours(order: list[Cell], random: Random) -> Iterator[list[Cell]]:
 
 
 def drop_detours(call: Call, level: int) -> bool:
-    """Drop steps of a level that cancel out if this improves the plan; return whether steps were dropped."""
+    """Drop steps of a level that cancel out if this improves the plan; return whether steps were dropped.
+
+    If an upper-level step loses steps, the remaining steps are grouped under upper-level steps with the same effect.
+    """
     steps, old = call.steps, call.tree()
     call.steps = without_detours(call.refiner, steps, level)
-    if improves(call.problem, call.tree(), old, level):
-        return True
-    call.steps = steps
-    return False
+    new = call.tree()
+    if not improves(call.problem, new, old, level):
+        call.steps = steps
+        return False
+    if len(new.at_level(call.program.levels[0])) < len(old.at_level(call.program.levels[0])):
+        grouped = regroupings(call.problem, Plan(new.at_level(level)), level, call.using)[0]
+        if improves(call.problem, grouped, old, level) and not validate(call.problem, grouped):
+            call.steps = refined(call, grouped.steps)
+    return True

@@ -14,6 +14,7 @@ from confab.reaching import with_current_reach
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.memory.links_file import memory_lines
 from confab.reasoner.validation.validate import validate
+from confab.scene import read
 
 
 def test_a_new_domain_is_valid_and_has_a_plan(tmp_path: Path) -> None:
@@ -40,20 +41,19 @@ def test_a_new_domain_overwrites_nothing(tmp_path: Path) -> None:
 def test_reach_facts_are_computed_if_they_are_missing_or_outdated(tmp_path: Path) -> None:
     new_domain("shop", tmp_path, bodies=True)
     scene, reach, said = tmp_path / "shop-scene.ttl", tmp_path / "shop-scene.reach.ttl", list[str]()
-    assert not confab.load(scene).plan().solved
-    assert with_current_reach(confab.load(scene), said.append).plan().solved
+    assert with_current_reach(read(scene), said.append).plan().solved
     before = reach.read_text()
-    with_current_reach(confab.load(scene), said.append)
+    with_current_reach(read(scene), said.append)
     assert said == ["computing the reach of the hands"]
     table = tmp_path / "shop-table.ttl"
     table.write_text(table.read_text().replace("e:x 0.4 ; e:y 0.2 ;", "e:x 0.4 ; e:y 0.48 ;"))
     os.utime(table, (reach.stat().st_mtime + 5,) * 2)
-    with_current_reach(confab.load(scene), said.append)
+    with_current_reach(read(scene), said.append)
     assert reach.read_text() != before
     bodies = tmp_path / "shop-bodies.ttl"
     bodies.write_text(bodies.read_text().replace("e:graspHeight 0.045 ;", ""))
     os.utime(bodies, (reach.stat().st_mtime + 5,) * 2)
-    assert with_current_reach(confab.load(scene), said.append).plan(mode="paper").solved
+    assert with_current_reach(read(scene), said.append).plan(mode="paper").solved
     assert "has no e:graspHeight" in said[-1]
 
 

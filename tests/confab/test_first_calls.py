@@ -15,6 +15,7 @@ import rdflib
 
 import confab
 from confab import ontology
+from confab.authoring import new_domain
 from confab.reasoner.graph.knowledge import KnowledgeError
 
 SCENE = "beverage-serving-moved"
@@ -281,3 +282,11 @@ def test_facts_are_accepted_in_every_usual_form(scene: confab.Scene) -> None:
         scene.facts["cup1"]
     row = scene.query("where-is-everything")[0]
     assert row.object == row["object"]
+
+
+def test_a_plan_of_a_scene_with_bodies_needs_no_reach_facts_on_disk(tmp_path: Path) -> None:
+    """Python computes missing reach facts as the command line does; without them the task would seem unsolvable."""
+    new_domain("plants", tmp_path, bodies=True)
+    assert not list(tmp_path.rglob("*.reach.ttl"))
+    assert confab.load(tmp_path / "plants-scene.ttl").plan().outcome.status.value == "solved"
+    assert list(tmp_path.rglob("*.reach.ttl"))

@@ -149,9 +149,10 @@ def test_any_rdf_file_can_be_queried_and_planning_names_the_missing_import(
 
 
 def test_an_empty_answer_false_or_0_is_logged_with_the_unknown_terms_of_the_query(
-    scene: confab.Scene, caplog: pytest.LogCaptureFixture
+    scene: confab.Scene, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with caplog.at_level(logging.WARNING):
+    monkeypatch.setattr(logging.getLogger("confab"), "propagate", True)  # an earlier call with -v has changed it
+    with caplog.at_level(logging.WARNING, "confab"):
         scene.query("SELECT ?o WHERE { ?o :location ?l ; rdfs:label ':cup1 x:y' . FILTER(?o != :cup1) }")
         assert "has no term :location (did you mean k:location?)" in caplog.text
         caplog.clear()

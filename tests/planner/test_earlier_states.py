@@ -132,7 +132,7 @@ def test_an_intervention_is_remembered_and_cannot_make_a_remembered_situation_fa
     done = scene.execute(interventions=["after=1 bus AT bridge", "after=3 bus AT station"])
     assert done.reached
     assert "bridge" not in [step.arguments[1] for step in done.episode.done.primitives]
-    with pytest.raises(KnowledgeError, match="SEEN remembers VISITED, and never becomes false"):
+    with pytest.raises(KnowledgeError, match="SEEN remembers VISITED, so it never becomes false"):
         scene.execute(interventions=["after=1 station SEEN false"])
 
 
