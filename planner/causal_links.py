@@ -1,11 +1,11 @@
 """The purpose of each step of a plan: causal links to the goal, to the step above it, or to a later step.
 
-A later step needs an earlier step of the same level if it depends on a fact that the earlier step makes true: with the previous
-value, the later step would be inapplicable or lose a required effect. Because the later step is tested with the previous value,
-causal links are found for any kind of condition, for example "no object stands on the shelf". The checker
-(`confab.planner.validation`) rejects a plan without a needed step. Each level has a separate sequence of steps. Where the plan
-leaves a level, lower-level steps replace the steps of the level. The facts that a step reads are recorded, and only these facts
-are reset to their previous values. Therefore the effort grows with the number of facts that the steps read, and not with the
+A later step needs an earlier step of the same level if the later step depends on a fact that the earlier step makes true. If the
+fact's symbol had its previous value, the later step would be inapplicable or lose a required effect. Because the later step is
+tested with the previous value, causal links are found for any kind of condition, for example "no object stands on the shelf". The
+checker (`confab.planner.validation`) rejects a plan without a needed step. Each level has a separate sequence of steps. Where the
+plan leaves a level, lower-level steps replace the steps of the level. The facts that a step reads are recorded, and only these
+facts are reset to their previous values. Therefore the effort grows with the number of facts that the steps read, and not with the
 square of the plan's length.
 """
 

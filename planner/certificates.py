@@ -35,7 +35,7 @@ class Certificate:
     cases : int
         Number of reachable combinations of distinguished values; the goal holds in none of these combinations.
     unmet : tuple of Fact
-        Goals; in each case, at least one of these goals doesn't hold.
+        Goals of which at least one doesn't hold in each case.
     """
 
     never: frozenset[Fact] = frozenset()

@@ -75,7 +75,7 @@ def instead_of(
     plan : Plan
     behavior : Behavior
     given : mapping of parameters to individuals
-        Individuals of parameters that aren't given are chosen so that the step is applicable.
+        For each parameter that isn't given, an individual is chosen that makes the step applicable.
     ask : callable
         Function that plans a problem.
     place : Step, optional

@@ -36,7 +36,7 @@ MOST_LACKING = 4
 
 
 def levels_left(problem: Problem, plan: Plan) -> list[Left]:
-    """Return the runs of lower-level steps in a valid plan, each with the conditions that the run violates.
+    """Return the runs of consecutive lower-level steps in a valid plan, each with the conditions that the run violates.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class _Watch:
                 self.step(part[0])
 
     def broken(self, level: int) -> Iterator[Broken]:
-        """Yield the violations of a finished run of steps, except violations by changes that the run undid."""
+        """Yield the violations of a finished run of lower-level steps, except violations by changes that the run undid."""
         before: dict[Cell, str | None] = {}
         for cell, old in self.history.pop(level):
             before.setdefault(cell, old)

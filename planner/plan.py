@@ -311,7 +311,7 @@ class Broken:
 
 @dataclass(frozen=True)
 class Left:
-    """A run of lower-level steps that replaces steps of a level.
+    """A run of consecutive lower-level steps that replaces steps of a level.
 
     `first` and `last` are the paths of the first and the last step; `broken` are the violated conditions of the level.
     """
@@ -359,8 +359,8 @@ class Outcome:
     found in the cache, and `misses` counts refinements that required a search. `cost` is the cost of the plan if some behaviour has
     a price. `bound` is a proved lower bound on the cost of every lowest-level plan for the same goals. `engine` names the external
     planner that found the plan. `given_up` describes the levels that the planner gave up, each with its goal. `left` contains the
-    runs of lower-level steps in the plan, with the violated conditions of the level above. `saving` is the decrease of the plan's
-    cost per second at the end of shortening, or None if the plan wasn't shortened. `certificate` proves that the task is
+    runs of consecutive lower-level steps in the plan, with the violated conditions of the level above. `saving` states how much
+    cost the shortening saved per second in the end; it is None if the plan wasn't shortened. `certificate` proves that the task is
     unsolvable; every unsolvable outcome of `confab.planner.solve` has a certificate. `forgone` contains the unmet soft goals.
     """
 

@@ -383,7 +383,7 @@ class Reading:
     def solutions(
         self, conditions: Sequence[Condition], env: Env, kinds: Mapping[str, str], must: bool = False
     ) -> Iterator[dict[str, str]]:
-        """Yield the bindings with which conditions may hold; if `must`, with which the conditions hold in every state."""
+        """Yield the bindings with which conditions may hold; if `must`, only the bindings with which they hold in every state."""
         yield from self._extended(self.lowest.steps(conditions, frozenset(env)), 0, dict(env), kinds, must)
 
     def _extended(
@@ -526,7 +526,7 @@ OPERATORS = {"scale": "*", "increase": "+", "decrease": "-"}
 
 
 def compared(one: Range, sign: str, other: Range, must: bool) -> bool:
-    """Return whether a comparison holds for some pair of amounts from two ranges; if `must`, for all pairs."""
+    """Return whether a comparison holds for some pair of amounts from two ranges; if `must`, whether it holds for all pairs."""
     if must and (one.partial or other.partial):
         return False
     if sign in (">", ">="):

@@ -148,7 +148,7 @@ class _Check:
         """Execute the steps that refine a step of level `above`, or the task (level 0); return whether all were applicable.
 
         In the task, the goal of a symbol takes precedence over the symbol's rest value. If `inside` is true, the steps refine a
-        step, and the rest value is required. Runs of lower-level steps may replace steps of the next level.
+        step, and the rest value is required. Runs of consecutive lower-level steps may replace steps of the next level.
         """
         level = next((level for level in self.levels if level > above), above)
         marks = []

@@ -81,7 +81,7 @@ def repair_or_replan(
     problem : Problem
         The present situation, and the present goal.
     rest : sequence of Step
-        The remaining steps; if the first step is partly done, it contains only its remaining sub-steps.
+        The remaining steps; if the first step is partly done, `rest` contains only the remaining sub-steps of this step.
     planned : Problem
         The problem for which `rest` was planned: the expected situation, and the goal.
     planner : callable, optional
@@ -224,7 +224,7 @@ def vanished(problem: Problem, why: Callable[[str], str] = lambda one: "") -> li
 
 
 def difference(old: Iterable[Step], new: Iterable[Step]) -> tuple[int, int]:
-    """Return the number of dropped primitives of the old steps and the number of added primitives of the new steps.
+    """Return two numbers: how many primitives the new steps drop, and how many primitives they add.
 
     The two sequences are compared in order: a primitive at another position counts as dropped and added.
     """
@@ -239,8 +239,8 @@ def difference(old: Iterable[Step], new: Iterable[Step]) -> tuple[int, int]:
 def _finish(call: Call, pending: list[Step], wanted: State) -> None:
     """Apply the unexecuted sub-steps of the step in progress until all symbols are at rest, and remove the step from `pending`.
 
-    No sub-step is applied if the sub-steps don't lead to rest, or if they achieve only former goals. The step in progress is
-    then dropped, unless all symbols are at rest already.
+    No sub-step is applied if the sub-steps don't bring all symbols to rest, or if they achieve only former goals. The step in
+    progress is then dropped, unless all symbols are at rest already.
     """
     mark = len(call.table.trail)
     for count, step in enumerate(pending, 1):
@@ -339,7 +339,7 @@ def _achieve_instead(call: Call, effects: Mapping[Cell, str]) -> None:
 
 
 def _useless(call: Call, effects: Mapping[Cell, str], wanted: State) -> bool:
-    """Return whether all first-level changes of a step were goals earlier and are no longer goals."""
+    """Return whether every first-level change of a step achieves a former goal that is no longer a goal."""
     situations, first = call.problem.domain.situations, call.program.levels[0]
     return all(
         call.goal.get((name, key)) != value and wanted.get(Symbol(name, arguments_of(key))) == value

@@ -12,9 +12,9 @@ from confab.planner.plan import Limits
 class RetryPolicy:
     """Limits of an episode: attempts per primitive, total failures, begun primitives per planned primitive, and planning limits.
 
-    `rounds` is the maximum number of times that failed steps are retried after all alternatives are exhausted: the
-    situation may have changed, or a hand may grasp differently. `rounds` also limits how often the agenda is checked in
-    an unchanged situation. `planning` limits each planning call; the whole episode ends by the current deadline
+    `rounds` is the maximum number of times that failed steps are retried after all alternatives are exhausted, because the
+    situation may have changed, or a hand may grasp differently. `rounds` also limits how often the agenda is checked in an
+    unchanged situation. `planning` limits each planning call; the whole episode ends by the current deadline
     (`confab.reasoner.limits.within`).
     """
 

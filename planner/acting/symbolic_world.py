@@ -139,8 +139,8 @@ class SymbolicWorld:
 def disturbed(problem: Problem, state: State, intervention: Intervention) -> dict[Symbol, str]:
     """Return the state after an intervention.
 
-    An object that is moved, knocked over or removed is released: a hand that held it comes to rest, and a hand that
-    touched it stays in place. An object that lies on the floor has no place.
+    An object that is moved, knocked over or removed is released. A hand that held the object comes to rest; a hand that only
+    touched the object stays in place. An object that lies on the floor has no place.
     """
     after = dict(state)
     if intervention.change is InterventionKind.KNOCK:

@@ -1,8 +1,8 @@
 """Choice among rule instances by cogency, which is learned from the facts of earlier choices and rejections.
 
-The facts about an individual in a role are generated from the domain. Such a fact concerns a class of the individual that
-behaviours distinguish, a value or goal value of the individual, an object that has the individual as value or goal value, or a
-static relation to the individual in another role.
+The facts about an individual in a role are generated from the domain. Such a fact is about one of the following: a class of the
+individual that behaviours distinguish, a value or goal value of the individual, an object that has the individual as value or goal
+value, or a static relation to the individual in another role.
 
 Cogency is eq. (1) of the paper in log odds: a rule contributes ln((c + ½)/(p + ½)) for c choices and p rejections or
 failures, and each fact contributes ln(p(fact | chosen)/p(fact | not)). An unseen fact contributes nothing; an unseen

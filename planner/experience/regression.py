@@ -161,7 +161,7 @@ class PlanTrace:
     def rules_of(self) -> Iterator[Rule]:
         """Yield a rule for each change of a step that a goal or a later step needs.
 
-        Afterwards, the facts of the trace are the facts of the initial state.
+        After the last rule, the facts of the trace are those of the initial state.
         """
         later, facts = self.facts, Facts(self.problem, self.problem.initial)
         for done in self.done:

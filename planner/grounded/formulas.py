@@ -131,14 +131,14 @@ class Formulas:
     def _any(
         self, condition: Witness | AnyOf, terms: Mapping[str, str], kinds: Mapping[str, str], negated: bool
     ) -> Literals:
-        """Return the formula that some group of conditions holds for some individuals; if `negated`, return the negation."""
+        """Return the formula for "some group of conditions holds for some individuals"; if `negated`, return the negation."""
         groups = self._groups_of(condition, frozenset(terms), kinds)
         if negated:
             return self.all_of(self.any_of(self._part(part, terms, True) for part in group) for group in groups)
         return self.any_of(self.all_of(self._part(part, terms) for part in group) for group in groups)
 
     def _part(self, part: _Part, terms: Mapping[str, str], negated: bool = False) -> Literals:
-        """Return the formula that some individuals satisfy all conditions of a part; if `negated`, return the negation."""
+        """Return the formula for "some individuals satisfy all conditions of a part"; if `negated`, return the negation."""
         bound = {name: terms[name] for name in part.bound}
         key = id(part), negated, tuple(bound.values())
         if key not in self._known:
@@ -256,7 +256,7 @@ class Formulas:
         return self._members[kind]
 
     def value(self, situation: str, arguments: tuple[str, ...], value: str, negated: bool) -> Literals:
-        """Return the formula that a symbol has a value; if `negated`, return the negation."""
+        """Return the formula for "a symbol has a value"; if `negated`, return the negation."""
         kind = self.reached.situations.get(situation)
         if kind is None:  # the situation type doesn't exist on this level
             return () if negated else None
@@ -283,7 +283,7 @@ class Formulas:
         return self.complements[bit]
 
     def opposite(self, bit: int) -> Literals:
-        """Return the formula that a bit isn't set."""
+        """Return the formula for "a bit isn't set"."""
         groups = self._groups.get(bit)
         if groups is not None:
             return self.all_of(self.any_of(self.opposite(one) for one in group) for group in groups)

@@ -137,7 +137,7 @@ class _Assembly:
         return self._build(rows, needs, owners, first, operators, count, wanted, derived, cases)
 
     def _needs(self, schema: Schema, rows: Ints) -> tuple[Ints, tuple[Ints, Ints]]:
-        """Return the rows of a schema whose conditions are satisfiable, and pairs of a row and a bit that the row requires."""
+        """Return the rows of a schema with satisfiable conditions, and pairs of a row and a bit that the row requires."""
         place = {name: column for column, name in enumerate(schema.terms)}
         columns = {name: rows[:, column] for name, column in place.items()}
         keep = np.ones(len(rows), bool)

@@ -25,7 +25,7 @@ from confab.planner.grounded.task import Task, bits_of
 MOST_TIMES = 1000
 """Maximum number of repetitions that count for one operator."""
 OF_BYTE = [bits_of(octet) for octet in range(256)]
-"""The positions of the bits of each byte."""
+"""The positions of the set bits of each byte value."""
 AmountPush: TypeAlias = "tuple[Linear, str, Exact | None]"
 """A difference, the required sign, and the change of the difference by an operator.
 

@@ -6,9 +6,9 @@ window. An operator is near if few steps lead from the start of the window to th
 the end of the window. The search is A* with h_FF (`confab.planner.grounded.shortest`). A state is dropped if, according to h,
 no cheaper plan leads through the state.
 
-Windows are tried on the given plan and on a regrouped plan, in which each step follows a step on which it depends. The given order
-is kept if the other order saves nothing. Finally, the remaining work is spent on the whole plan as one window, with all operators
-and a greater weight of h. Of two equally cheap plans, the plan with fewer steps counts as cheaper (`TRIFLE`).
+Windows of steps are tried on the given plan and on a regrouped plan, in which each step follows a step on which it depends. The
+given order is kept if the other order saves nothing. Finally, the remaining work is spent on the whole plan as one window, with all
+operators and a greater weight of h. Of two equally cheap plans, the plan with fewer steps counts as cheaper (`TRIFLE`).
 
 Work is counted in examined operators instead of seconds. Therefore the result is the same on every machine.
 
@@ -36,14 +36,13 @@ from confab.planner.grounded.task import BitChange, Grouped, Task, bits_of
 from confab.planner.plan_costs import TRIFLE
 
 STATES, STEPS = 400, 12
-"""Before windows are tried, a cheapest plan is searched with at most `STATES` states, if the given plan has at most `STEPS` steps.
-"""
+"""At first, a cheapest plan is searched with at most `STATES` states, if the given plan has at most `STEPS` steps."""
 WAYS = 20
 """Number of alternatives of derived bits that are processed in the time in which one operator is examined."""
 SIZES = (8, 16, 32)
 """Lengths of windows in steps; a long window can contain a whole round trip that a shorter plan avoids."""
 OPERATORS, EVALUATIONS, SHARE = 150, 100, 2_000
-"""Limits of the search of a window: the number of operators, and the minimum number of evaluations of h_FF.
+"""Limits of the search for a cheaper window of steps: the number of operators, and the minimum number of evaluations of h_FF.
 
 The maximum number of evaluations is `EVALUATIONS`, or the work divided by `SHARE` if this is greater.
 """
@@ -58,7 +57,7 @@ LOOK = 50
 def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None = None) -> list[int]:
     """Return a plan that costs at most as much as the given plan.
 
-    The result is a cheapest plan if a search of few states proves this; otherwise the result is a plan with replaced windows.
+    The result is a cheapest plan if a search of few states proves this; otherwise some windows of steps may be replaced.
 
     Parameters
     ----------
@@ -202,15 +201,15 @@ def _leads(task: Task, state: int, plan: Sequence[int]) -> bool:
 
 @dataclass
 class _Windows:
-    """The common data of the windows of one task; `work` is the remaining work."""
+    """The common data of the windows of steps of one task; `work` is the remaining work."""
 
     task: Task
     work: int
     most: int
-    """Maximum number of evaluations of h_FF in the search of a window."""
+    """Maximum number of evaluations of h_FF in the search for a cheaper window of steps."""
     deadline: float | None
     failed: set[tuple[int, int, float]] = field(default_factory=set)
-    """Windows that weren't replaced, each as a state, required bits and a cost."""
+    """Windows of steps that weren't replaced, each as a state, required bits and a cost."""
 
     @cached_property
     def cut(self) -> float:
@@ -421,7 +420,7 @@ class _Windows:
         return part, operators
 
     def _part_with_amounts(self, amounts: Amounts, operators: Sequence[int], state: int, wanted: int) -> Task:
-        """Return the task of a window with all bits of the whole task.
+        """Return the task of a window of steps, with all bits of the whole task.
 
         In a state with amounts, the number of the tuple of amounts is stored above the bits of the whole task.
         """

@@ -249,7 +249,7 @@ class Reached:
         return best
 
     def _fan_out(self, atom: Atom, columns: Mapping[str, Ints]) -> float:
-        """Return an estimate of the number of rows of the atom's table that match one row of `columns`."""
+        """Estimate how many rows of the atom's table match one row of `columns`."""
         free = len({t for t in atom.terms if t.startswith("?")} - columns.keys())
         return float(max(len(self.tables[atom.table]), 1) ** (free / max(len(atom.terms), 1)) - (not free))
 

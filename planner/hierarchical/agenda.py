@@ -139,7 +139,7 @@ class Agenda:
         return False
 
     def wake(self, mark: int) -> None:
-        """Reopen the goals that waited for a symbol which has changed since a marked state, and the goals that were undone."""
+        """Reopen the goals that were undone since a marked state, and the goals that waited for a symbol which has changed."""
         call, asleep = self.call, self._asleep
 
         def opened(cell: Cell) -> None:

@@ -82,7 +82,7 @@ class Call:
         self.redone = 0
         """Number of times that all steps were undone and replaced by other steps."""
         self.saving: float | None = None
-        """The cost per second that the last round of shortening saved, or None before shortening."""
+        """The cost that the last round of shortening saved per second; None before shortening."""
         self.bound: float | None = None
         """A lower bound on the cost of every plan, if the primitives have different costs."""
         self.settled = False

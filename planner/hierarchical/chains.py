@@ -1,8 +1,8 @@
 """Search for a few relevant steps that achieve targets, by iterative deepening on a table.
 
-`targets` are the symbols to be changed, each with its required value. `off` contains the symbols without their required final
-value; the search succeeds when no such symbol remains. `changed` contains the symbols that differ from the start, each with its
-value; these values identify a state.
+`targets` are the symbols to be changed, each with its required value. `off` contains the symbols that don't have their required
+final value; the search succeeds when no such symbol remains. `changed` contains the symbols that differ from the start, each with
+its value; these values identify a state.
 
 The search tries only relevant behaviours (`confab.planner.hierarchical.relevance`). Therefore the result is a shortest sequence of
 relevant steps. Longer sequences and other steps require the search of a scope (`confab.planner.hierarchical.scope`).

@@ -130,7 +130,7 @@ class _Course:
         return [self.node(i, j, groups.get((i, j))) for i, j in best]
 
     def node(self, begin: int, end: int, grounds: Sequence[Ground] | None) -> Step:
-        """Return the upper-level step, or the steps that are refined together, above the run between two positions."""
+        """Return the upper-level step, or the steps that are refined together, above the steps between two positions."""
         if grounds is None:
             return self.steps[begin]
         self.enter(begin)

@@ -4,9 +4,9 @@ The first method plans the goals again in other orders, and reuses known refinem
 of a level by cheaper steps (`confab.planner.hierarchical.windows`). The third method removes steps whose changes cancel out
 (`confab.planner.hierarchical.detours`).
 
-Other orders are tried only if the plan moves an object away or has many steps per goal. Windows, which may refine several steps
-together, are tried only if a shorter plan is likely. The cheapest plan is kept; among equally cheap plans, the plan with the fewest
-primitives. Steps of the first level explain the steps below. Therefore steps of the first level are dropped only if the plan
+Other orders are tried only if the plan moves an object away or has many steps per goal. The second method, which may refine several
+steps together, is used only if a shorter plan is likely. The cheapest plan is kept; among equally cheap plans, the plan with the
+fewest primitives. Steps of the first level explain the steps below. Therefore steps of the first level are dropped only if the plan
 becomes much cheaper.
 """
 
@@ -61,8 +61,8 @@ def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Cal
     """Shorten the steps of a call in rounds, each with twice the work of the round before.
 
     By default, there is one round. With repeated shortening, if round n was the last round that made the plan cheaper, there are at
-    most 2 n rounds. If windows of the lowest level can make refinements cheaper, repeated shortening has at least `LEAST_ROUNDS`
-    rounds. A brief call has one round with little work, or no round if the call has a time limit.
+    most 2 n rounds. If other steps of the lowest level can make refinements cheaper, repeated shortening has at least
+    `LEAST_ROUNDS` rounds. A brief call has one round with little work, or no round if the call has a time limit.
     """
     least = LEAST_ROUNDS if lasting(call) else 1
     if prices(call) > 1 and call.bound is None:
@@ -81,7 +81,7 @@ def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Cal
 
 
 def shorten_once(call: Call, work: int, leave_levels: bool, advised: Callable[[Call], None], random: Random) -> None:
-    """Try other orders of the goals, the removal of detours, and windows of the lower levels, each with bounded work."""
+    """Try other orders of the goals, the removal of detours, and cheaper steps of the lower levels, each with bounded work."""
     levels = call.program.levels
     aside = len(levels) > 1 and puts_aside(call)
     if aside or (len(levels) > 1 and len(call.steps) > MANY * len(call.goal)):

@@ -1,7 +1,7 @@
 """Windows: cheaper steps replace consecutive steps of a level; a search of the grounded level finds the cheaper steps.
 
-The new steps also satisfy preconditions of upper levels (`confab.planner.hierarchical.inherited_preconditions`). The
-new steps are refined. A run of new steps with the effect of an upper-level step is grouped under this step.
+The new steps also satisfy preconditions of upper levels (`confab.planner.hierarchical.inherited_preconditions`). The new steps are
+refined. Consecutive new steps that together have the effect of an upper-level step are grouped under this step.
 """
 
 from __future__ import annotations

@@ -222,7 +222,7 @@ def _behavior(behavior: Behavior, name: str, conditions: Sequence[object], effec
 
 @dataclass(frozen=True)
 class _Event:
-    """An event of a window: the step's number, whether the step begins or ends, and the symbols that are read and changed."""
+    """An event: the number of its step, whether the step begins or ends, and the symbols that are read and changed."""
 
     step: int
     begins: bool
@@ -459,7 +459,7 @@ class _Finder:
         return {}
 
     def times(self, node: _Node, ending: Mapping[int, int]) -> list[int] | None:
-        """Return the earliest begins of the steps of a window if the running steps in `ending` end next.
+        """Return the earliest begins of a node's steps if the running steps in `ending` end next.
 
         The last entry is the time from the begin of the first ending step to the events that its end must wait for. Return None if
         a step would end too late.

@@ -3,7 +3,7 @@
 A primitive begins when all events that must precede its begin have happened, and the time windows of its individuals allow the
 begin. So a delay shifts only the primitives that depend on the late primitive. The end of a primitive isn't controlled. If an end
 must follow another event, the primitive begins only if this order holds for all durations within the stated spread; otherwise the
-primitive is held back. When a primitive ends earlier or later than expected, turns that haven't begun are exchanged to keep
+primitive is held back. When a primitive ends earlier or later than expected, actors' turns that haven't begun are exchanged to keep
 deadlines and to shorten the makespan.
 
 Networks whose durations are observed, not controlled, are described by Vidal and Fargier, "Handling contingency in temporal
@@ -40,7 +40,7 @@ from confab.reasoner.symbols import Problem, Symbol, Times
 UNIT = Fraction(1, 1000)
 """The unit of observed times, in seconds; observed times are rounded up."""
 WORK = 20_000
-"""Maximum number of arcs that the exchanges of turns process after the end of a primitive."""
+"""Maximum number of arcs that are processed for the exchange of turns after the end of a primitive."""
 
 
 @dataclass(frozen=True)
@@ -88,12 +88,12 @@ class Dispatch:
         self._settle()
 
     def step(self, number: int) -> Step:
-        """Return a primitive with the actors of its turn."""
+        """Return a primitive with the actors that are assigned to it."""
         renamed = renamed_by(self.order, self.turns)
         return (exchanged(self.problem, self.plan, renamed) if renamed else self.plan).primitives[number]
 
     def expected(self, number: int) -> Fraction:
-        """Return the expected duration of a primitive with the actors of its turn, in seconds."""
+        """Return the expected duration of a primitive with the actors that are assigned to it, in seconds."""
         return self.lasts[number] * self.network.unit
 
     def ready(self, now: Fraction) -> list[int]:
@@ -119,7 +119,7 @@ class Dispatch:
         self.begun[number] = self._units(now)
 
     def end(self, number: int, now: Fraction) -> None:
-        """Report that a primitive ends; turns that haven't begun may be exchanged."""
+        """Report that a primitive ends; actors' turns that haven't begun may be exchanged."""
         time = self.over[number] = self._units(now)
         if self.controlled and time - self.begun[number] != self.lasts[number]:
             self._exchange(time)
@@ -155,7 +155,7 @@ class Dispatch:
         return ceil(now / self.network.unit)
 
     def _settle(self) -> None:
-        """Compute the durations, and the edges into and out of each primitive, from the order of the turns."""
+        """Compute the durations, and the edges into and out of each primitive, from the order of the turns of each resource."""
         self.lasts = durations_with(self.network, self.choices, self.turns)
         self.edges = [*dict.fromkeys((*self.network.edges, *turn_edges(self.order, self.turns)))]
         self.into: dict[int, list[Edge]] = defaultdict(list)
@@ -243,7 +243,7 @@ class Dispatch:
     # ------------------------------------------------------------------------------------------------------- exchanges
 
     def _exchange(self, time: int) -> None:
-        """Exchange turns that haven't begun if this keeps more deadlines or shortens the makespan."""
+        """Exchange actors' turns that haven't begun if this keeps more deadlines or shortens the makespan."""
         fixed = {
             turn
             for line in self.turns

@@ -1,4 +1,4 @@
-"""Alternative actors for the turns of a plan.
+"""Alternative actors for the turns of a plan; a turn is a part in which an actor leaves its first state and returns to it.
 
 An alternative actor belongs to the same classes as the actor of the plan, and their symbols have the same initial values. The
 static facts allow the steps of the alternative actor. The plan checker decides whether the result is a plan.
@@ -28,7 +28,7 @@ from confab.reasoner.symbols import (
 
 
 def choices_of(problem: Problem, plan: Plan, order: Order, network: Network) -> Choices:
-    """Return the actors that could take each turn of an order.
+    """Return, for each turn in an order of activities, the actors that could take the turn.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def _of_the_classes(problem: Problem, actors: Iterable[str]) -> dict[str, list[s
 
 
 def _whole_steps(plan: Plan, order: Order) -> Callable[[str, Sequence[int]], bool]:
-    """Return a function that tests whether a turn can have another actor.
+    """Return a function that tests whether another actor can take a turn.
 
     For each step that names the actor, either all of the actor's primitives in the step belong to the turn, or none of
     these primitives does.

@@ -59,7 +59,7 @@ class Network:
         return self.tick if low == END and (high == BEGIN or i > j) else self.separation
 
     def ends(self, i: int, begin: int, lasts: int) -> list[int]:
-        """Return the latest ends that the latest times, the window and the fixed time of an activity allow.
+        """Return the latest ends that the latest times, the time window and the fixed time of an activity allow.
 
         An activity that begins in a time window also ends in this time window.
         """
@@ -97,7 +97,7 @@ class Begins:
         The activity that determines the begin of each activity; -1 if no activity determines the begin.
     makespan : int
     late : int
-        The sum of the times by which activities miss their latest times, windows or fixed times. If the sum is 0, the begins
+        The sum of the times by which activities miss their latest times, time windows or fixed times. If the sum is 0, the begins
         satisfy the network.
     latest : int
         The activity with the greatest lateness; -1 if no activity is late.
@@ -151,7 +151,7 @@ def earliest(
 ) -> Begins | None:
     """Return the earliest begins that satisfy the edges of a network and additional edges, or None if the edges form a cycle.
 
-    Activities may miss their latest times, windows or fixed times (`Begins.late`).
+    Activities may miss their latest times, time windows or fixed times (`Begins.late`).
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ def _only_forward(arcs: Sequence[Sequence[tuple[int, int]]], cyclic: set[int]) -
 
 
 def _lateness(network: Network, i: int, begin: int, lasts: int) -> int:
-    """Return the time by which an activity misses its latest times, windows or fixed time, or 0 if in time."""
+    """Return the time by which an activity misses its latest times, time windows or fixed time, or 0 if in time."""
     late, end, fixed = 0, begin + lasts, network.at[i]
     for which, by in network.latest[i]:
         late = max(late, (end if which == END else begin) - by)

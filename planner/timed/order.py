@@ -63,7 +63,7 @@ class Order:
     latest : mapping of (activity, begin or end) to seconds
         The latest time of an event that achieves a goal with a deadline.
     windows : mapping of activity to pairs of seconds
-        The time windows of an activity; begin and end must lie within the same window.
+        The time windows of an activity; begin and end must lie within the same time window.
     """
 
     activities: tuple[Activity, ...]
@@ -295,7 +295,7 @@ def _latest(
 def _windows(times: Times, activities: Sequence[Activity]) -> dict[int, tuple[tuple[Fraction, Fraction | None], ...]]:
     """Return the time windows of activities that name individuals with time windows.
 
-    An activity must lie within a window of each individual that the activity names.
+    An activity must lie within a time window of each individual that the activity names.
     """
     found: dict[int, tuple[tuple[Fraction, Fraction | None], ...]] = {}
     for number, one in enumerate(activities):

@@ -84,7 +84,7 @@ def _fixed(behavior: Behavior) -> tuple[Parameter, ...]:
 
 
 def terms_at(rules: BehaviorReader, pieces: Pieces, arguments: Arguments, facts: Facts) -> Arguments:
-    """Return the individuals of the parameters of a behaviour's pieces when the behaviour begins."""
+    """When a behaviour begins, return the individuals for the parameters of its pieces."""
     behavior = pieces.whole
     if not pieces.fixed:
         return arguments

@@ -155,7 +155,7 @@ class _Search:
         return None if begins is None else CandidateSchedule(turns, begins)
 
     def starts(self) -> Iterator[list[list[TurnId]]]:
-        """Yield the orders of turns of the first schedules.
+        """Yield the orders of turns that lead to the first schedules.
 
         The first order keeps the actors of the sequence. In the second order, the actor that is free first takes each turn.
         """
@@ -167,7 +167,7 @@ class _Search:
     def shared(self) -> list[list[TurnId]]:
         """Return the turns in the order of the sequence; the actor with the least work takes each turn.
 
-        An actor takes no other turn before its turn is over.
+        An actor takes its next turn only after its current turn.
         """
         work = [0] * len(self.order.resources)
         lines: list[list[TurnId]] = [[] for _ in self.order.resources]

@@ -119,7 +119,7 @@ def shared(problem: Problem, plan: Plan, until: float | None, shorten: bool = Tr
     until : float, optional
         The end of the search, on the clock of `perf_counter`.
     shorten : bool
-        Whether the search continues after it has found a schedule that keeps all windows and deadlines.
+        Whether the search continues after it has found a schedule that keeps all time windows and deadlines.
     """
     search = _Search(problem, plan, until, shorten)
     with suppress(LimitError):
