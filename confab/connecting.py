@@ -36,8 +36,8 @@ def connected(scene: Known, problem: Problem, on: str, seed: int = 0) -> tuple[I
     Raises
     ------
     KnowledgeError
-        `on` has another form, the scene has no such interface, the interface has no action for a primitive, or no connection is
-        possible.
+        `on` isn't of the form ``INTERFACE:ADDRESS``, the scene has no such interface, the interface has no action for a primitive,
+        or no connection is possible.
     """
     name, where = parts_of(on)
     interface = read_interface(scene.knowledge.store, scene.names.short, name)

@@ -138,7 +138,8 @@ def explain(
     number : int
         The index in `steps` of the step to be explained.
     against : behaviour and arguments, optional
-        The alternative; by default the most cogent of the other behaviours that the rules advise in the same state.
+        The alternative; by default the behaviour with the highest cogency (score) among the other behaviours that the rules advise
+        in the same state.
     labels : Labels, optional
         The labels that the text uses for individuals.
 
@@ -203,7 +204,7 @@ def behind(memory: Memory, name: str) -> str:
 
 
 def _best(alternatives: Sequence[RuleInstance], advisor: Advisor, reader: FactReader) -> RuleInstance | None:
-    """Return the most cogent of several instances of rules, or None if there is no instance."""
+    """Return the rule instance with the highest cogency (score), or None if there is no instance."""
 
     def key(c: RuleInstance) -> float:
         facts, individual = reader.facts(c.rule, c.roles), reader.individuals(c.rule, c.roles)

@@ -18,9 +18,9 @@ class _Step(TypedDict):
 
 
 class StepJson(_Step, total=False):
-    """A step with its sub-steps; in paper mode, `rank` is the rank of its cogency.
+    """A step with its sub-steps; in paper mode, `rank` is the step's rank by cogency (score).
 
-    If the sub-steps refine further steps together with this step, `joined` has these steps.
+    If the sub-steps also refine other steps of the same level, `joined` has these other steps.
     """
 
     rank: float

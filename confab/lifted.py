@@ -1,4 +1,4 @@
-"""Sentences about learned experience: rules, orders of goals, methods, kinds of goals, and the facts that cogency counts."""
+"""Sentences about learned experience: rules, orders of goals, methods, kinds of goals, and the facts that a score counts."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ class Sayings:
         raise TypeError(one)
 
     def asked(self, fact: tuple[str, str], roles: Mapping[str, str]) -> str:
-        """Return a sentence about a fact that cogency counts, with individuals in place of roles."""
+        """Return a sentence about a fact that cogency (a score) counts, with individuals in place of roles."""
         asks, answer = fact
 
         def put(word: str) -> str:

@@ -16,7 +16,7 @@ condition `:AmountEffect`           an amount, ``:change``, ``:amount`` or ``:ri
 ========================  =====================================================================
 
 Arguments are ``:about``, ``:argument2`` and so on (`ARGUMENTS`). An amount is stated by a situation type with its arguments, or by
-a relation with its arguments except the number.
+a relation with all of its arguments except the number.
 """
 
 from __future__ import annotations

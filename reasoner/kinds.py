@@ -38,7 +38,7 @@ TREE = "an exported behaviour tree"
 DOMAIN, PROBLEM, CATALOG = "an exported PDDL domain", "an exported PDDL problem", "a catalog"
 STAMP = re.compile(rb"(<!-- )?[#;] Written by Confab: (?P<kind>[^;\n]+); SHA-256 (?P<hash>[0-9a-f]{64})( -->)?\n?\Z")
 STAMP_BYTES = 200
-"""Number of bytes at the end of a file in which a stamp is searched."""
+"""A stamp is searched in this number of bytes at the end of a file."""
 HEAD_BYTES = 4096
 PICTURES = (b"\x89PNG\r\n\x1a\n", b"%PDF-")
 GENERATOR = re.compile(rb'<meta name="generator" content="Confab"')

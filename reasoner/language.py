@@ -1,4 +1,7 @@
-"""Traversal of conditions: terms, variables, nested conditions. A new kind of condition is added here and in the checker."""
+"""Traversal of conditions: terms, variables, nested conditions.
+
+Code for a new kind of condition belongs into this module and into the checker.
+"""
 
 from __future__ import annotations
 

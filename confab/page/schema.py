@@ -56,7 +56,10 @@ class StepData(TypedDict, total=False):
 
 
 class Thing(TypedDict):
-    """An object on the map. Each element of `at` has a time, the object's place (or an empty text), a sentence, and a tone."""
+    """An object on the map.
+
+    Each element of `at` has a time, the object's place (or an empty text), a sentence, and a tone (the meaning of a colour).
+    """
 
     id: str
     label: str

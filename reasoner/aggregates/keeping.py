@@ -229,7 +229,7 @@ class _Keeping:
         return _Candidate(replace(effect, each=None, when=()), named, value, before)
 
     def agrees(self, candidate: _Candidate, tuple_: Mapping[str, str]) -> Conjunction:
-        """Return the condition that a tuple belongs to a candidate."""
+        """Return the condition that a tuple is one of the tuples of a candidate."""
         effect = candidate.effect
         found: list[Formula] = []
         if effect.each is not None:
@@ -250,7 +250,7 @@ class _Keeping:
         return both(found)
 
     def effects(self, number: int) -> Iterator[AmountEffect]:
-        """Yield the effects on the total for the tuples of a candidate that don't belong to an earlier candidate."""
+        """Yield the effects on the total of a candidate's tuples, except tuples that belong to an earlier candidate."""
         candidate = self.candidates[number]
         effect = candidate.effect
         tuple_: dict[str, str] = {}
@@ -348,7 +348,7 @@ class _Keeping:
     def _contributing(self, tuple_: Mapping[str, str]) -> tuple[list[Formula], Conjunction, Conjunction]:
         """Return the conditions under which a tuple contributes.
 
-        There are constant conditions, conditions before the behaviour, and conditions after the behaviour.
+        The three groups are constant conditions, conditions before the behaviour, and conditions after the behaviour.
         """
         conditions = [substituted(condition, tuple_) for condition in self.conditions]
         changing = [condition for condition in conditions if self.after.changed(condition)]

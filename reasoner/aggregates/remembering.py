@@ -55,7 +55,7 @@ def in_order_of_update(domain: Domain) -> list[Aggregate]:
 
 
 def count_of(name: str, domain: Domain) -> Aggregate:
-    """Return the count that is 1 for the arguments of a remembered situation type if the original symbol is true.
+    """Return, for a remembered situation type, the count that is 1 if the original symbol with the same arguments is true.
 
     Raises
     ------

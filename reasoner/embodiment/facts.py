@@ -183,7 +183,7 @@ def rows(store: ox.Store, query: str) -> list[tuple[str, ...]]:
 
 
 def grouped(rows: Iterable[tuple[str, ...]]) -> Mapping[str, list[str]]:
-    """Return a mapping of the first elements of pairs to lists of their second elements."""
+    """Return a mapping of each first element of the pairs to the list of its second elements."""
     groups: dict[str, list[str]] = defaultdict(list)
     for key, value in rows:
         groups[key].append(value)

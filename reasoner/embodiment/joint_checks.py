@@ -97,7 +97,7 @@ def part_of_two(embodiment: Embodiment) -> Iterator[Flaw]:
 
 
 def carried_off_its_surface(embodiment: Embodiment) -> Iterator[Flaw]:
-    """Yield the places of furniture and links that aren't on a supporting surface, or that are inside a solid.
+    """Yield faulty places of furniture and links: places that aren't on a supporting surface, or that are inside a solid.
 
     Places near meshes and tilted solids aren't checked.
     """

@@ -27,7 +27,7 @@ def roles_of(use: SkillUse) -> set[str]:
 
 
 def unplayed(use: SkillUse) -> Iterator[tuple[Phase, str]]:
-    """Yield each phase that mentions a role that no term of the behaviour plays, together with the role."""
+    """Yield each phase that mentions a role which no parameter or variable of the behaviour has, together with the role."""
     for phase in use.phases:
         for word in (phase.by, *phase.to.split(), *phase.touches):
             role = word.partition(".")[0]
@@ -58,7 +58,7 @@ def endless(use: SkillUse) -> Iterator[tuple[Phase, str]]:
 
 
 def role_not_played(embodiment: Embodiment) -> Iterator[Flaw]:
-    """Yield phases that mention a role that no term of the behaviour plays."""
+    """Yield phases that mention a role which no parameter or variable of the behaviour has."""
     for use in embodiment.skills.values():
         for phase, role in unplayed(use):
             yield (

@@ -201,7 +201,7 @@ class Measured:
         return cls(len(seconds), round(mean, DIGITS), round(sqrt(squares / max(len(seconds) - 1, 1)), DIGITS))
 
     def __add__(self, other: Measured) -> Measured:
-        """Return the statistics of all executions, for the statistics of two disjoint sets of executions.
+        """Return the joint statistics of two disjoint sets of executions.
 
         >>> Measured.of([1.0]) + Measured.of([2.0, 3.0]) == Measured.of([1.0, 2.0, 3.0])
         True
@@ -294,7 +294,7 @@ class Experience:
         own.update({key: own[key] + one if key in own else one for key, one in found.items()})
 
     def statistics(self, replicas: Collection[str]) -> Statistics:
-        """Return the durations that some replicas measured, without disabled ones."""
+        """Return the durations that some replicas measured, except disabled durations."""
         found: dict[tuple[str, str], Measured] = {}
         for replica, known in self.durations.items():
             for key, one in known.items():

@@ -1,7 +1,7 @@
 """Translation of rules, orders and methods to triples and back, in the vocabulary of conditions and behaviours.
 
-A `:LearnedRule` has a goal (`:forGoal`), conditions (`:asksFor`), and a behaviour with arguments (`:does`); its roles are
-parameters. A `:LearnedMethod` has the refined behaviour (`:refines`) and steps with an index. A `:LearnedOrder` has the
+A `:LearnedRule` has a goal (`:forGoal`), conditions (`:asksFor`), and a behaviour with arguments (`:does`); the roles of the rule
+are its parameters. A `:LearnedMethod` has the refined behaviour (`:refines`) and steps with an index. A `:LearnedOrder` has the
 situation types `:first` and `:then`. ``:enabled false`` disables an item.
 """
 

@@ -33,7 +33,7 @@ MOMENT, PASSED = "Moment", "passed"
 
 
 class Variables(Protocol):
-    """Interface of `confab.reasoner.pddl.importing` for the quantified variables of one behaviour."""
+    """Protocol for the quantified variables of one behaviour, which `confab.reasoner.pddl.importing` implements."""
 
     def condition(
         self, form: Form, named: Mapping[str, str] | None = None, negated: bool = False
@@ -42,7 +42,7 @@ class Variables(Protocol):
 
 
 class Table(Protocol):
-    """Interface of `confab.reasoner.pddl.importing` for the names and translations of a problem."""
+    """Protocol for the names and translations of a problem, which `confab.reasoner.pddl.importing` implements."""
 
     pddl: Pddl
     level: int

@@ -419,7 +419,7 @@ class _Search(Individuals):
             reached.update(o for s, p, o in triples if s in facts and p in PLACES)
 
     def _close_by_path(self, frontier: set[str], bounds: Routes) -> None:
-        """Read all individuals that the routes reach from a frontier.
+        """Read all individuals that the routes reach from given individuals (the frontier).
 
         More individuals may be read, because a property path ignores constants.
         """
@@ -488,7 +488,7 @@ def _goal_individuals(schema: Schema) -> set[str]:
 
 
 def _goal_classes(schema: Schema) -> set[str]:
-    """Return the classes in goals about all individuals of a class, and the classes of values that goals exclude."""
+    """Return the classes that stand for all their members in goals, and the classes of the values that goals exclude."""
     goals = [schema.nodes.get(iri, {}) for iri in goal_conditions(schema)]
     wanted = {v for node in goals for name in PLACES for v in node.get(name, ()) if v in schema.individuals_of}
     negated = (node for node in goals if {"true", "1"}.intersection(node.get(CORE + "negated", ())))

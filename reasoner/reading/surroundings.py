@@ -62,7 +62,7 @@ class Surroundings:
         return (named & self.schema.individuals_of) | (values - self.schema.pairs)
 
     def _add(self, fresh: set[str], classes: Iterable[str] = ()) -> None:
-        """Read individuals and members of classes, and then, repeatedly, the individuals that are values of read individuals."""
+        """Read individuals and members of classes, and then their values, until no new individual is found."""
         seen, nodes = self.individuals.seen, self.schema.nodes
         while fresh or classes:
             rows = self.individuals.visit(fresh, {CORE + "about": fresh} if self.schema.tuples else None, classes)

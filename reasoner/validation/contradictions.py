@@ -186,7 +186,7 @@ class _Inner:
 
 
 def repeated_names(case: Case) -> Iterator[Fault]:
-    """Find negated conditions that contain a class condition on a term bound outside.
+    """Find negated conditions with a class condition on a term that is bound outside the negated condition.
 
     The author of the ontology probably meant two different individuals.
     """

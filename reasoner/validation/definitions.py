@@ -36,7 +36,7 @@ NOT_EVALUATED = {
 
 
 def definitions_without_effect(case: Case) -> Iterator[Fault]:
-    """Find axioms that concern situation types and are ignored by planning, and stated facts about derived situation types."""
+    """Find axioms about situation types that planning ignores, and stated facts about derived situation types."""
     if case.reading is None:
         return
     schema, names, rules = case.reading.schema, case.reading.names, case.reading.problem.domain.rules

@@ -142,7 +142,7 @@ class _Exclusive:
                 return False
 
     def handed_over(self, behavior: Behavior, effect: ValueEffect) -> bool:
-        """Return whether the previous holder of an effect's value loses the value, or is itself the receiver."""
+        """Return whether the individual with an effect's value loses the value, or is the individual that gets the value."""
         (own,) = effect.arguments
         return any(
             holder == own or self.releases(behavior, effect.when, holder, effect.value)

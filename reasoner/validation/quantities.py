@@ -118,7 +118,7 @@ def multiplied_amounts(case: Case) -> Iterator[Fault]:
 def numbers_missing(case: Case) -> Iterator[Fault]:
     """Find individuals for which the ontology lacks a number that a behaviour reads.
 
-    A behaviour isn't applicable to an individual without a number that it reads.
+    A behaviour isn't applicable to an individual without a number that the behaviour reads.
     """
     if case.reading is None:
         return
