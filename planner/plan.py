@@ -407,7 +407,7 @@ class Limits:
     together. `work` limits searches in grounded levels and parts of levels until a plan is found. The unit of `work` is states
     times operators, about a microsecond each. `shortening` is the work for a shorter plan. With "once", there is one round.
     With "brief", there is one round with little work, or no round if `seconds` is given. With "repeated", rounds follow one
-    another until a round saves nothing or until `seconds` have passed.
+    another until the second half of them has saved nothing, or until `seconds` have passed.
     """
 
     expansions: int = 200_000
