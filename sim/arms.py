@@ -105,15 +105,15 @@ def read_arm(
     turned: Sequence[float] = (0.0, 0.0, 0.0),
     home: Sequence[float] | None = None,
 ) -> Arm:
-    """Return the arm of `joints` that ends in link `tip`; the hand's frame is turned by `turned` (roll, pitch, yaw) in the link.
+    """Return the arm of `joints` with its hand at link `tip`; `turned` is the hand's roll, pitch and yaw relative to the link.
 
     The rest posture of the arm is `home`, or the middle of the joints' limits if `home` is None.
 
     Raises
     ------
     ValueError
-        The URDF has no such joint or link, the arm has not 6 or 7 joints, or a joint is unsuitable. The message names the
-        fault.
+        The URDF lacks a named joint or link, the number of joints is neither 6 nor 7, or a joint is unsuitable. The message names
+        the fault.
     """
     if missing := [
         *(f"joint '{name}'" for name in joints if name not in model.joints),

@@ -19,7 +19,7 @@ FARTHEST = 100.0
 
 
 def read_robot(robot: Robot, base: Array | None = None) -> UrdfModel:
-    """Return a robot's model at the zero posture, with its base at the stated position or at `base` (x, y, yaw).
+    """Return a robot's model at the zero posture; its base is at `base` (x, y, yaw), by default at the robot's own position.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def _mount(root: ET.Element, hand: Hand) -> None:
 
 
 def _drive(root: ET.Element, robot: Robot) -> None:
-    """Put the base on joints along x and y and about z of the robot's own frame."""
+    """Mount the base on three joints of the robot's own frame: along x, along y and about z."""
     base, parent = _base(root), "ground"
     _weigh(ET.SubElement(root, "link", name=parent), "0")
     for i, (name, kind, axis) in enumerate(DRIVE):

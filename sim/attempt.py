@@ -34,22 +34,22 @@ from confab.sim.urdf import Array
 from confab.sim.verdict import REFUTED, SkillError, named
 
 CLOSE = 0.002
-"""Margin in metres to obstacles on short straight motions; it is less than `MARGIN`, since the load may have slipped before."""
+"""Margin in metres to obstacles on short straight motions; a load that has slipped may be nearer to them than `MARGIN`."""
 
 TOPPLED = 0.5
 """Minimum tilt in radians of a body that counts as toppled."""
 
 NOWHERE = 100.0
-"""Distance beyond the reach, in metres, that marks a pose as impossible because the hand would not be level."""
+"""Fictitious distance in metres beyond the arm's reach, which marks a pose at which the hand would not be level."""
 
 TIGHT = (0.006, 0.004, 0.003)
 """Margins in metres that are tried in turn if the full margin leaves no candidate.
 
-The margins in `TIGHT` are above `CLOSE`, since the load may slip on the way.
+Each margin exceeds `CLOSE`, since the load may slip on the way.
 """
 
 ROUNDED = 3
-"""A corner of a path is rounded over at most this number of samples before the corner, and as many after the corner."""
+"""Maximum number of samples on either side of a corner over which the corner of a path is rounded."""
 
 THIN = 0.01
 """Assumed opening in metres of fingers that are closed around a handle."""
@@ -64,7 +64,7 @@ FINER = 4
 """Factor by which a line that ends on contact is sampled more finely than other lines."""
 
 BATCH, ENOUGH = 24, 6
-"""Number of candidates that are checked for collisions at a time, and number of collision-free candidates that end the check."""
+"""Number of candidates in one collision check, and number of collision-free candidates after which no more are checked."""
 
 
 @dataclass(frozen=True)
@@ -137,8 +137,8 @@ class Attempt:
         Raises
         ------
         SkillError
-            No candidate is left. The code is `unreachable` with the distance in metres beyond the reach, or `goal in
-            collision` with the obstacles.
+            No candidate pose is reachable and collision-free at all stages. The error code is `unreachable` with the distance in
+            metres beyond the reach, or `goal in collision` with the obstacles.
         """
         with self.planning():
             reacher = self.reacher(opening=opening)
@@ -178,7 +178,7 @@ class Attempt:
         )
 
     def _discomfort(self, poses: Array, postures: Sequence[Array]) -> Array:
-        """Return the costs of candidate poses: for cramped postures, for pointing aside, and for turns from the present pose."""
+        """Return the costs of candidate poses; cramped postures, hands that point aside and turns of the hand cost more."""
         arm, now = self.hand.arm, self.hand.pose
         ahead = np.arctan2(*(poses[:, :2] - arm.shoulder[:2]).T[::-1])
         cost: Array = np.sum([comfort(arm, q) for q in postures], axis=0)
@@ -218,7 +218,7 @@ class Attempt:
     def move_to_any(
         self, goals: Sequence[Array], objects: tuple[str, ...], *ignored: str, opening: float | None = None
     ) -> int:
-        """Move along a collision-free path to one of the goal poses, the first if possible; return the index of the reached pose.
+        """Move along a collision-free path to the first goal pose, or else to another one; return the index of the reached pose.
 
         `opening` is the assumed opening of the fingers in metres.
         """
@@ -286,10 +286,10 @@ class Attempt:
         partly: bool = False,
         others: Iterable[Array] = (),
     ) -> None:
-        """Move along the first collision-free path among `poses` and `others`, or until `stop` returns true.
+        """Move along the first collision-free path, `poses` or one of `others`; end the motion early if `stop` returns true.
 
-        With `partly`, a path with a collision-free beginning suffices, and the noise of perception reduces the margin,
-        since contact ends the motion. Raise `SkillError` if all paths are blocked.
+        With `partly`, contact ends the motion, so only the beginning of the path has to be collision-free. The margin to obstacles
+        is then reduced by the noise of perception. Raise `SkillError` if all paths are blocked.
         """
         with self.planning():
             reacher = self.reacher(*ignored, margin=CLOSE - 2 * self.world.noise if partly else CLOSE)
@@ -404,7 +404,7 @@ def _blocked(
 ) -> SkillError:
     """Return the error for stages without a collision-free candidate.
 
-    The error names the bodies that block most candidates. The message names the phase in which the least room is left.
+    The error names the bodies that block most candidates. The message names the phase in which the hand has the least room.
     """
     nearest: dict[str, Array] = {}
     rooms: list[tuple[float, float, str, Stage]] = []
@@ -433,7 +433,7 @@ def _blocked(
 
 
 def room_of(distance: float) -> str:
-    """Return the first words of a sentence about the distance of the hand or its load from a body.
+    """Return the distance of the hand or its load from a body in words, as the beginning of a message.
 
     >>> room_of(0.0012), room_of(-0.004)
     ('1 mm from', '4 mm inside')

@@ -291,7 +291,7 @@ def outer_radius(shape: Shape) -> float:
 
 
 def half_width(shape: Shape, height: float, turned: Array) -> Array:
-    """Return half of a shape's width (n,) between fingers at `height` above its base, for hands `turned` (n,) from its x axis."""
+    """Return half of a shape's width (n,) between fingers at `height`, for hands at angles `turned` (n,) from its x axis."""
     if shape.kind == "box":
         width, depth = (shape.numbers[name] / 2 for name in ("width", "depth"))
         return np.asarray(width * np.abs(np.sin(turned)) + depth * np.abs(np.cos(turned)))
@@ -306,7 +306,7 @@ def height_of(shape: Shape) -> float:
 def pieces(shape: Shape, hollow: bool = False) -> Iterator[tuple[str, tuple[float, float, float], Array, Array]]:
     """Yield the solids that represent a shape in motion planning: kind, half extents, middle (3,) and rotation (3, 3).
 
-    A vessel is a solid cylinder, or with `hollow` a bottom and a wall, if objects are put into the vessel.
+    A vessel is a solid cylinder. With `hollow`, for a vessel into which objects are put, it is a bottom and a wall.
     """
     if shape.kind == "box":
         width, depth, height = (shape.numbers[name] / 2 for name in ("width", "depth", "height"))

@@ -21,7 +21,7 @@ EDGE, BETWEEN = 0.004, 0.02
 """Radius of the spheres along the lower edge of a load, and distance between neighbouring spheres, in metres."""
 
 ABOVE = 0.01
-"""Height in metres above the base of a load, below which no sphere of the load reaches, since the base touches a table."""
+"""Height in metres above the base of a load at which the load's spheres begin, since the base touches a table."""
 
 POINTS = 4000
 """Number of points whose distances are computed at once; larger arrays don't fit into the processor's cache."""
@@ -176,7 +176,7 @@ def _free(centers: Array, radii: Array, around: Surroundings, margin: float) -> 
 
 
 def _meeting(low: Array, high: Array, bottom: Array, top: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the indices of the boxes `low` to `high` (m, 3) and `bottom` to `top` (s, 3) that meet a box of the other group.
+    """Return the indices of boxes that meet a box of the other group, given the boxes' corners (m, 3) and (s, 3).
 
     The filter saves time, since most spheres of an arm are far from most obstacles.
     """
@@ -238,8 +238,8 @@ def fixed_spheres(model: UrdfModel, arms: Sequence[Arm]) -> Spheres:
 def column(heights: Array, radii: Array, bottom: float) -> Spheres:
     """Return spheres that cover an upright body of revolution above `bottom`, except the body's edges.
 
-    Ascending `heights` and `radii` give the outline of the body. A sphere is as wide as the body at the sphere's centre, or a
-    ring of smaller spheres, if the wide sphere would protrude below the body.
+    Ascending `heights` and `radii` give the outline of the body. Each sphere is as wide as the body at the sphere's centre. If such
+    a sphere would protrude below the body, smaller spheres replace it.
 
     >>> column(np.array([0.0, 0.1]), np.array([0.03, 0.03]), 0.0).centers[:, 2].round(3).tolist()  # a ring at 0.02
     [0.02, 0.04, 0.06, 0.08, 0.02, 0.02, 0.02, 0.02]
@@ -261,7 +261,7 @@ def column(heights: Array, radii: Array, bottom: float) -> Spheres:
 
 
 def rim(heights: Array, radii: Array) -> Spheres:
-    """Return small spheres along the lower edge of an upright body of revolution; `column` leaves out this edge."""
+    """Return small spheres along the lower edge of an upright body of revolution; the spheres of `column` don't cover this edge."""
     wide = float(radii[0]) - EDGE
     around = np.linspace(0.0, 2 * np.pi, max(int(np.ceil(2 * np.pi * wide / BETWEEN)), 3), endpoint=False)
     centers = np.stack([wide * np.cos(around), wide * np.sin(around), 0 * around + heights[0] + EDGE], -1)

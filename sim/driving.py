@@ -54,7 +54,7 @@ class Roller:
 
     @property
     def spread(self) -> Array:
-        """Size (6,) of the search region beyond start and goal, in metres and radians."""
+        """Distance (6,) by which the search region extends beyond start and goal, in metres and radians."""
         return np.array([1.0, 1.0, 0.0, np.pi, 0.0, 0.0])
 
     def at(self, q: Array) -> Array:
@@ -65,7 +65,7 @@ class Roller:
         return np.asarray(np.einsum("nij,mj->nmi", turned, self.centers) + shift[:, None])
 
     def solve(self, poses: Array) -> tuple[Array, Flags]:
-        """Return x, y and yaw of the base at poses, and a true flag for each pose, since a base reaches all poses."""
+        """Return x, y and yaw of the base at poses, and flags of reachable poses, which are all true for a base."""
         return poses[:, BASE], np.ones(len(poses), dtype=bool)
 
     def free(self, q: Array) -> Flags:
@@ -82,7 +82,7 @@ class Roller:
         return next((i for i, way in enumerate(ways) if self.follow(way) is not None), None)
 
     def detours(self, start: Array, goal: Array) -> Iterator[Array]:
-        """Yield the intermediate poses of paths that back off, and of paths that back off, turn and approach the goal forwards."""
+        """Yield the intermediate poses of detours, on which the robot backs off, turns, and approaches the goal forwards."""
         for back in BACKING:
             ends = []
             for pose in (start, goal):

@@ -45,7 +45,7 @@ LOOKS = 6
 """Number of noisy measurements whose mean is a perceived position."""
 
 STEADY = 5.0
-"""A body counts as unmoved within this number of standard deviations of its perceived position."""
+"""A body counts as unmoved if a new measurement is within this number of standard deviations of its perceived position."""
 
 NEAR_PLACE = 0.05
 """Maximum distance in metres between a place and a body at the place."""
@@ -199,7 +199,7 @@ class Engine:
             raise SkillError("tracking error", self.touching(hand) or (hand.hand.name,), joint_lag_rad=lag)
 
     def touching(self, hand: Manipulator) -> tuple[str, ...]:
-        """Return the bodies in contact with the robot of a hand, with the held body, or with a body that the robot touches.
+        """Return the bodies that touch the robot of a hand, its held body, or another body in contact with the robot.
 
         The held body itself is left out.
         """
@@ -282,8 +282,7 @@ class Engine:
     def remember(self, name: str, rotation: Array, position: Array) -> None:
         """Store a body's perceived pose in the frame of its carrier.
 
-        With noise, the stored position of a body that has not clearly moved is only shifted a little towards the new
-        measurement.
+        With noise, if a body has not clearly moved, its stored position is only shifted a little towards the new measurement.
         """
         carrier = self.carried_by(name, position)
         frame, origin = self.carrier(carrier)
@@ -354,9 +353,9 @@ class Engine:
     def look(self, before: int = 0) -> None:
         """Draw new random errors of perception.
 
-        The error of a mechanism holds until the next look, and the error of a body until the next simulation step. An error is
-        the mean of several measurements. After `before` earlier looks at an unchanged world, the error is the mean of all
-        looks.
+        The error of a mechanism holds until the next look, and the error of a body until the next simulation step. An error is the
+        mean of several measurements. If the world is unchanged since `before` earlier looks, the error is the mean over these looks
+        and the new look.
         """
         seen = {name: error for name, (steps, error) in self.errors.items() if before and steps == self.steps}
         self.errors.clear()
@@ -366,7 +365,7 @@ class Engine:
             self.errors = {name: (self.steps, self._mean(before, error)) for name, error in seen.items()}
 
     def _mean(self, before: int, error: Array) -> Array:
-        """Return the mean error of one more look and of `before` looks whose mean is `error`."""
+        """Return the mean of a new random error and `before` earlier errors, whose mean is `error`."""
         seen = self.rng.normal(0.0, self.noise, (LOOKS, 3)).mean(0)
         mean: Array = (before * error + seen) / (before + 1)
         return mean
@@ -392,7 +391,7 @@ class Engine:
         return point
 
     def carried_by(self, name: str, base: Array | None = None) -> str:
-        """Return the link or body that carries the place of a body; an empty string if no place of a carrier is near.
+        """Return the link or body that carries the place nearest to a body; an empty string if no such place is near.
 
         `base` replaces the true position of the body.
         """
@@ -403,9 +402,9 @@ class Engine:
         return self.embodiment.places[best].carrier if best and gaps[best] < NEAR_PLACE else ""
 
     def below(self, place: str) -> tuple[str, ...]:
-        """Return the carrier of a place; of a mechanism or link, return only the parts that reach down to the place.
+        """Return the carrier of a place; if it is a mechanism or link, return only its parts that aren't wholly above the place.
 
-        A part that is wholly above the place, such as the board above a shelf, stays an obstacle.
+        The other parts, such as a board above the place, stay obstacles.
         """
         carrier, point = self.embodiment.places[place].carrier, self.place(place)
         if carrier not in self.links:
@@ -421,7 +420,7 @@ class Engine:
     def nearest_place(self, point: Array) -> tuple[str, float]:
         """Return the place that is horizontally nearest to a point, and its distance.
 
-        Among several places above one another, the next place below the point is returned.
+        If several places are above one another, the next place below the point is returned.
         """
         points = {name: self.place(name) for name in self.embodiment.places}
         gaps = {name: float(np.hypot(*(point[:2] - where[:2]))) for name, where in points.items()}
@@ -432,7 +431,7 @@ class Engine:
         return best, gaps[best]
 
     def acting(self, roles: Mapping[str, str]) -> str:
-        """Return the hand among the roles of a skill, or the first hand of the robot among the roles, or an empty string."""
+        """Return the hand in a skill's roles, otherwise the first hand of the robot in the roles, otherwise an empty string."""
         own = (name for name, hand in self.hands.items() if hand.robot.name == roles.get("robot"))
         return roles.get("hand") or next(own, "")
 
@@ -537,7 +536,7 @@ class Engine:
     def load_spheres(self, hand: Manipulator, body: str, whole: bool = False) -> Spheres:
         """Return spheres for a held body, and for the bodies that stand on it, in the hand's frame.
 
-        The lowest centimetres of the held body, which may touch a table, are covered only with `whole`.
+        Without `whole`, no sphere covers the lowest centimetres of the held body, which may touch a table.
         """
         centers, radii = [], []
         for name in self.load(body):
@@ -551,8 +550,8 @@ class Engine:
     def clear_height(self, hand: Manipulator, body: str, point: Array, least: float, most: float) -> float:
         """Return the lowest height above a point, from `least` to `most`, at which an upright load keeps the margin to obstacles.
 
-        A load in a hole has to rise above the rim. The result is `least` if, on the way up, the load gets nearer to an obstacle
-        such as the top of a cupboard.
+        A load in a hole has to rise above the rim. The result is `least` if a higher load would be nearer to an obstacle, such as
+        the top of a cupboard.
         """
         spheres = whole_spheres(self.bodies[body].shape)
         rises = np.arange(least, max(most, least) + STEP_UP / 2, STEP_UP)

@@ -26,7 +26,7 @@ AROUND = 2 * np.pi - 0.01
 """Minimum range of angles, in radians, that counts as a full turn."""
 
 SKEWED = 20.0
-"""Cost of a candidate per metre by which a box is wider between the fingers than at its faces."""
+"""Cost of a candidate per metre of additional width between fingers that don't lie flat on the faces of a box."""
 
 TURNS = 13
 """Number of turns that are tried about a vertical axis with a limited range."""
@@ -67,7 +67,7 @@ class FeatureFrame:
 
 @dataclass(frozen=True)
 class Ways:
-    """Candidates (n,) for a hand at a feature: turns about the feature's z before and after a joint's motion, and swivels.
+    """Candidates (n,) for a hand at a feature: swivels, and turns about the feature's z axis before and after a joint has moved.
 
     `cost` (n,) is the cost of a turn at which the fingers don't lie flat on the faces of a box.
     """

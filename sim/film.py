@@ -53,7 +53,7 @@ ABOVE = 0.01
 """A name is shown if a point at this height in metres above the place, or above the top of the object, is visible."""
 
 NEARLY = 0.97
-"""A ray from a camera hits a handle if its first hit is at least at this share of the distance to the handle."""
+"""A camera sees a handle if its ray first hits the mechanism, and not before this share of the distance to the handle."""
 
 STACKED = 3
 """Number of rows in which names are stacked if they would overlap."""
@@ -265,7 +265,7 @@ def _points(world: Engine, name: str) -> list[tuple[Array, str]]:
 
 
 def _visible(world: Engine, camera: Camera, point: Array, name: str) -> bool:
-    """Return whether a camera sees a point: only the named thing, or an object at the named place, may be in between."""
+    """Return whether a camera sees a point of `name`; only the thing itself, or an object at this place, may cover the point."""
     hit = pybullet.rayTest(camera.eye, point.tolist(), physicsClientId=world.client)[0]
     if hit[0] < 0:
         return True
@@ -277,7 +277,7 @@ def _visible(world: Engine, camera: Camera, point: Array, name: str) -> bool:
 
 
 def _covered(world: Engine, name: str) -> bool:
-    """Return whether an object stands at a place on another object, whose name would hide the objects."""
+    """Return whether a place on an object is occupied, so that the place's name would hide both objects."""
     place = world.embodiment.places.get(name)
     return (
         place is not None

@@ -43,8 +43,8 @@ def inverse(arm: Arm, r: Array, p: Array, swivel: Array, margin: float = 0.0, fo
     valid : array (n,) of bool
         Whether the point is in reach and every joint is within its limits. Only one of the two postures of a spherical joint is
         considered, so that neighbouring poses have neighbouring postures. The middle joint of the considered posture is within
-        ±90°. If the outer axes are parallel, the posture farther from the limits is considered. Without a closed form, the
-        posture that is found from the rest posture is considered.
+        ±90°. If the outer axes of the spherical joint are parallel, the considered posture is the one farther from the joint's
+        limits. Without a closed form, the considered posture is the result of a search that starts from the rest posture.
     """
     if not arm.closed:
         return solved(arm, r, p, swivel, margin, fold)
@@ -95,7 +95,7 @@ def _angles_far_from_limits(arm: Arm, r: Array, first: int) -> Array:
 
 
 def _by_last_joint(arm: Arm, r: Array, p: Array, swivel: Array, most: float) -> tuple[Array, Flags]:
-    """Return postures with the last joint at its middle plus `swivel` and the hand's roll, and flags of reachable postures.
+    """Return postures, with the last joint at the sum of its middle, `swivel` and the hand's roll, and flags of reachable ones.
 
     The last angle determines the wrist (w) and the direction of the sixth axis (e). The distance from shoulder to wrist
     determines the elbow's angle. The angle between the directions of the wrist and of the sixth axis determines the
@@ -149,7 +149,7 @@ def _phase(axis: Array, a: Array, b: Array) -> float:
 
 
 def _angles_of(axis: Array, a: Array, b: Array, product: Array, most: float) -> tuple[Array, Flags]:
-    """Return the two angles (n, 2) of rotations about an axis that give `b` (3,) a stated dot product with `a` (n, 3), and flags.
+    """Return the two angles (n, 2) by which `b` (3,) turns about an axis to a given dot product with `a` (n, 3), and flags.
 
     The flag of two angles is true if the absolute cosine that determines the angles is below `most`.
     """

@@ -17,10 +17,10 @@ from confab.sim.collision import Solid
 from confab.sim.urdf import Array, UrdfModel, read_model, rotation
 
 WIDER = 0.25
-"""Share of the range between `opened` and the upper limit by which a joint is opened farther than `opened`."""
+"""Share of the range from `opened` to the upper limit; a joint is opened by this share of the range beyond `opened`."""
 
 LONGEST, SLIM = 0.15, 0.7
-"""Maximum length in metres of a pictured post of a handle, and ratio of the post's width to the width of the handle's bar."""
+"""Maximum length in metres of the drawn post behind a handle, and ratio of the post's width to the width of the handle's bar."""
 
 HERE = np.zeros(3)
 

@@ -2,7 +2,7 @@
 
 Rule 1: an intervention acts on bodies. A cup that is moved leaves the hand and keeps its contents.
 Rule 2: an intervention on an object of the running primitive stops the primitive.
-Rule 3: before facts are observed, a hand at no perceivable position, or a tilted empty hand, is brought upright and lifted.
+Rule 3: before an observation, a hand at an unknown position, and a tilted empty hand, is turned upright and lifted.
 Rule 4: an object that stands at no place of the scene gets a new place, a spot (`confab.sim.lookout`).
 """
 
@@ -79,7 +79,7 @@ class LiveWorld:
         self.waiting = sorted((i for i in interventions if i.of_world and i.at is not None), key=lambda i: i.at or 0.0)
 
     def observe(self) -> State:
-        """Raise tilted empty hands and hands at no perceivable position, and return the facts that are perceived afterwards."""
+        """Raise empty tilted hands and hands whose position can't be perceived; return the facts that are perceived afterwards."""
         seen = self.world.observe()
         lost = {s.arguments[0] for s in self.world.symbols if s not in seen and s.arguments[0] in self.world.hands}
         lost |= {name for name in self.world.hands if not self._upright(name) and self.world.held(name) is None}

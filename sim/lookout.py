@@ -1,4 +1,4 @@
-"""Discoveries of a live world: objects that no fact mentions, and spots that are no places of the scene.
+"""Discoveries of a live world: objects that no fact mentions, and new places (spots).
 
 A *spot* is a new place for an object that stands at none of the scene's places, or a free place on the furniture at which an
 object can be put down. A spot belongs to the classes that all places of the scene share. A spot has the static facts of the
@@ -92,7 +92,8 @@ class Lookout:
     def _meet(self, name: str) -> None:
         """Discover an object.
 
-        The object belongs to the class of objects that have places. An object too wide for every hand counts as fixed.
+        The object becomes a member of the class for which the situation type of places is declared. An object too wide for every
+        hand counts as fixed.
         """
         world, problem = self.world, self.problem
         uses = world.embodiment.perceivers
@@ -145,7 +146,7 @@ class Lookout:
         return bool(abs(gap[2]) < LEVEL and np.hypot(*gap[:2]) < NEAR_PLACE)
 
     def _covered(self, name: str, own: str) -> tuple[str, ...]:
-        """Return the places, except `own`, at which a thing leaves motion planning no room for another object."""
+        """Return the places, except `own`, to which a thing is so near that no other object fits there."""
         world = self.world
         base, radius = world.sense(name)[1], outer_radius(world.bodies[name].shape)
         least = (

@@ -20,7 +20,8 @@ from confab.sim.linkage import HERE, moved, read_mechanism, solids, urdf_name, w
 from confab.sim.urdf import Array, UrdfModel
 
 TRIP, STAY = 0.6, 0.3
-"""Shares of the range from `opened` to the upper limit at which a latching joint trips, and at which the latch holds the joint."""
+"""Two shares of the range from `opened` to the upper limit: a latching joint trips at the first, and its latch holds it at the
+second."""
 
 
 SLIGHT = 0.0002
@@ -122,7 +123,7 @@ def _let_touch(mechanic: Mechanic) -> None:
     Raises
     ------
     ValueError
-        Two links overlap by more than a touch. The message names both links and the overlap in millimetres.
+        Two links penetrate each other. The message names both links and the overlap in millimetres.
     """
     owners: dict[str, tuple[int, Mechanism | Link]] = {mechanic.mechanism.name: (-1, mechanic.mechanism)}
     owners |= {link.name: (mechanic.joints[link.name], link) for link in mechanic.mechanism.links}
@@ -150,7 +151,9 @@ def overlap_of(client: int, one: tuple[int, int], other: tuple[int, int]) -> flo
 
 
 def _resist(client: int, body: int, joint: int, link: Link, held: bool) -> None:
-    """Set a joint's friction, or its spring, which pushes the joint to 0 or, with `held`, to the value held by the latch.
+    """Set a joint's spring or, without a spring, its friction.
+
+    The spring pushes the joint to 0, or with `held` to the value at which the latch holds the joint.
 
     A motor with target velocity 0 models Coulomb friction, since PyBullet does not read friction from the URDF.
     """

@@ -15,9 +15,9 @@ Array = NDArray[np.float64]
 SPACING = 0.008
 """Maximum distance in metres between neighbouring points of a surface."""
 SLACK, LEAST, MOST = 0.2, 0.004, 0.02
-"""Maximum protrusion of spheres: a share of the mesh's thickness, and lower and upper bound in metres."""
+"""Maximum protrusion of spheres as a share of the mesh's thickness, and the bounds of this protrusion in metres."""
 MOST_POINTS, CANDIDATES, SHARES = 1_500, 150, (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
-"""Maximum numbers of points to cover and of candidate centres per shell (a scaled copy of the mesh), and the scales of
+"""Maximum number of points to cover, maximum number of candidate centres per shell (a scaled copy of the mesh), and the scales of
 the shells."""
 MOST_PIECES, FARTHEST = 400_000, 1_000.0
 """Maximum number of surface points of a mesh, and maximum distance in metres of its points from the link's origin."""

@@ -32,7 +32,7 @@ JUMP = 0.35
 """Maximum motion in radians of a joint between neighbouring poses of a path; a larger motion indicates a singularity."""
 
 APPROACH_TOLERANCE = 0.001
-"""Maximum distance in metres by which a hand that leaves an obstacle's margin may approach the obstacle."""
+"""Maximum distance in metres by which a hand that is within an obstacle's margin may approach the obstacle on its way out."""
 
 FEWEST = 5
 """Minimum number of samples of a timed path, which has to accelerate and brake between two ends at rest."""
@@ -58,7 +58,7 @@ class Traveller(Protocol):
 
     @property
     def spread(self) -> Array:
-        """Size (6,) of the search region beyond start and goal, in metres and radians."""
+        """Distance (6,) by which the search region extends beyond start and goal, in metres and radians."""
 
     def solve(self, poses: Array) -> tuple[Array, Flags]:
         """Return the joint values at poses, and for each pose whether the pose is within reach."""
@@ -97,7 +97,7 @@ class Reacher:
 
     @property
     def spread(self) -> Array:
-        """Size (6,) of the search region beyond start and goal, in metres and radians."""
+        """Distance (6,) by which the search region extends beyond start and goal, in metres and radians."""
         return np.array([0.25, 0.25, 0.2, 1.0, 0.0, 0.8 if self.arm.swivels else 0.0])
 
     def solve(self, poses: Array) -> tuple[Array, Flags]:
@@ -234,7 +234,7 @@ def connect(
 
 
 def leave(reacher: Reacher, start: Array) -> Array | None:
-    """Return a collision-free pose at the end of a line from `start` on which the hand approaches no obstacle, or None."""
+    """Return a collision-free pose, to which a line from `start` leads without approach to an obstacle, or None."""
     ahead = np.array([np.cos(start[3]), np.sin(start[3]), 0.0])
     aside = np.array([-ahead[1], ahead[0], 0.0])
     for metres in (0.03, 0.06, 0.1, 0.15):
@@ -273,7 +273,10 @@ def _rrt_connect(
 def _extend(
     reacher: Traveller, nodes: list[Array], back: list[int], target: Array, greedy: bool = False
 ) -> Array | None:
-    """Extend a tree along the free part of the line to `target`, if `greedy` as far as possible; return the new pose or None."""
+    """Extend a tree towards `target` as long as the line is free; return the new pose or None.
+
+    Without `greedy`, the extension is short.
+    """
     nearest = int(np.abs((np.array(nodes) - target) / STEP).max(1).argmin())
     way = line(nodes[nearest], target)[1:]
     if not greedy:
@@ -366,7 +369,7 @@ def timed(arm: Arm, q: Array, limits: MotionLimits, rate: float) -> tuple[Array,
 
 
 def scheduled(q: Array, rows: Array, top: Array, most: Array, rate: float) -> tuple[Array, Array]:
-    """Return positions and velocities at `rate` hertz along samples `q`; the limits of speed and acceleration apply to `rows`."""
+    """Return positions and velocities at `rate` hertz along samples `q`; the limits hold for the coordinates `rows`."""
     first, second = np.gradient(rows, axis=0), np.zeros_like(rows)
     second[1:-1] = np.diff(rows, 2, axis=0)
     push = most / 2

@@ -35,7 +35,7 @@ With more damping, the search is slower. With less damping, the search is unstab
 """
 
 SINGULAR = 0.45
-"""Least singular value of the Jacobian of an arm of two equal limbs, divided by the sine of the angle between the limbs."""
+"""Ratio of the Jacobian's least singular value to the sine of the angle between the limbs, for an arm of two equal limbs."""
 
 
 def solved(arm: Arm, r: Array, p: Array, swivel: Array, margin: float, fold: float) -> tuple[Array, Flags]:

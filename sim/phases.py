@@ -68,7 +68,7 @@ NARROW = 0.02
 """Opening in metres of each finger at a handle with little room beside the handle."""
 
 FAR = 1e3
-"""Coordinate in metres, beyond reach, that marks a pose as impossible."""
+"""Coordinate in metres, far beyond the reach of every arm, that marks a pose as impossible."""
 
 
 def carry_out(world: Engine, use: SkillUse, roles: Mapping[str, str]) -> Mapping[str, float]:
@@ -156,7 +156,7 @@ def _with_looks(run: Run, phase: Phase, motion: Callable[[], None]) -> None:
 
 
 def _offset(run: Run, phase: Phase, turned: Array) -> Array:
-    """Return the shifts (n, 3) that a phase's offset states for hands with rotations `turned` (n, 3, 3)."""
+    """Return the offset of a phase as vectors (n, 3), for hands with rotations `turned` (n, 3, 3)."""
     local = np.array([run.number(part) for part in phase.offset])
     if phase.bring == "base":
         attempt = run.attempt
@@ -169,7 +169,7 @@ def _offset(run: Run, phase: Phase, turned: Array) -> Array:
 
 
 def _poses(run: Run, phase: Phase, previous: Array, way: Ways | None) -> Array:
-    """Return the goal poses (n, 6) of a phase for hands at poses `previous` (n, 6), with grasps `way` (n) if given."""
+    """Return the goal poses (n, 6) of a phase for hands at poses `previous` (n, 6); `way` has the hands' grasps, if given."""
     poses = previous.copy()
     if phase.to == "hand":
         poses[:, :3] += _offset(run, phase, rotations(previous))
@@ -395,4 +395,4 @@ CONDITIONS: Mapping[str, Callable[[Run], bool]] = {
     "place": lambda run: run.roles.get("target", "") in run.world.embodiment.places,
     "thing": lambda run: run.roles.get("target", "") not in run.world.embodiment.places,
 }
-"""Conditions for the execution of a phase; they concern the load at the beginning of the skill, or the skill's target."""
+"""Conditions under which a phase is executed; they depend on the load at the beginning of the skill, or on the skill's target."""

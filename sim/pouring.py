@@ -49,7 +49,8 @@ SUFFICIENT = 0.9
 SURPLUS = 0.25
 """Fraction of a serving that should stay in the source in addition to whole servings: half of the rounding tolerance.
 
-Another tilt can pour a missing amount. A surplus can't be put back, and beads that are stuck in a neck leave all at once.
+If too little was poured, another tilt pours the missing amount. If too much was poured, the surplus can't be put back. Beads that
+are stuck in a neck leave all at once.
 """
 
 
@@ -267,9 +268,9 @@ class _Servo:
     def meter(self, numbers: Numbers, enough: float, nearly: float, poured: Callable[[], float]) -> bool:
         """Roll on slowly while there is no flow, and wait while beverage flows; return whether the amount `enough` was poured.
 
-        The function `poured` returns the amount so far. The expected flow in the `lag` seconds in which the hand rolls
-        back is added to the amount. If the flow stops early, the smaller amount `nearly` suffices. The result is False
-        if nothing flows for a while at the steepest angle.
+        The function `poured` returns the amount so far. To this amount, the controller adds the flow that it expects in the `lag`
+        seconds in which the hand rolls back. If the flow stops early, the smaller amount `nearly` suffices. The result is False if
+        nothing flows for a while at the steepest angle.
         """
         before, flowing, still = poured(), 0, 0
         looks = [before] * (1 + round(FLOWING / (LOOK * self.tick)))

@@ -1,9 +1,9 @@
 """The places within reach of each hand, computed from the geometry of URDF, furniture and shapes, without a physics engine.
 
-Bodies of the scene are grasped at one or more heights. A hand reaches a place if there is a grasp pose at each of these
-heights; heights at which no hand reaches any place of the same kind don't count. Approach, grasp and lift must be within the
+Bodies of the scene are grasped at one or more heights. A hand reaches a place if there is a grasp pose at each of these heights. A
+height doesn't count if no hand reaches any place of the same kind at this height. Approach, grasp and lift must be within the
 joints' limits, and free of contact with furniture and the robot's trunk. Below an obstacle, a hand lifts an object less high. A
-place on a movable body is reached if the place is reached while the body is at some place. Physics finds whether the hand
+hand reaches a place on a movable body if it reaches the place for at least one place of the body. Physics finds whether the hand
 reaches the place while the body is at its present place.
 """
 
@@ -37,7 +37,7 @@ SPARE = 0.01
 """Distance in metres by which an object may stand farther away than its place."""
 
 LAYERS = 3
-"""Reach is computed for places on at most this number of movable bodies that stand on one another."""
+"""Maximum number of movable bodies, one standing on another, for whose places reach is computed."""
 
 STAGES = ("when grasping", "when approaching", "when lifting")
 """Names of the stages of a grasp, in the order of `grip_stages`."""
@@ -118,7 +118,9 @@ def _sum(spot: Place, place: Place) -> tuple[float, float, float]:
 
 
 def hindrance(embodiment: Embodiment, place: str) -> tuple[str, ...]:
-    """Return, for each hand that does not reach a place, the first impossible stage of a grasp and the obstacle, with open links.
+    """Return a message for each hand that doesn't reach a place: the first impossible stage of a grasp, and the obstacle.
+
+    All links are open.
 
     Raises
     ------
@@ -223,7 +225,7 @@ def _heights(embodiment: Embodiment, place: str, heights: Sequence[float]) -> Se
 
 
 def _taken_at(embodiment: Embodiment, height: float) -> str:
-    """Return the height in millimetres and the first body that is grasped at this height, as the end of a sentence."""
+    """Return the end of a message: the first body that is grasped at a height, and this height in millimetres."""
     names = [name for name, body in embodiment.bodies.items() if body.shape.grasp_height == height]
     return f" {names[0]}, {height * 1000:.0f} mm above its base" if names else ""
 

@@ -30,7 +30,7 @@ CLOSING = 0.12
 
 @dataclass(frozen=True)
 class Whereabouts:
-    """The object or place at which a hand is, and the target's position when the hand arrived; a raised hand has no position.
+    """The object or place at which a hand is, and the position of this target when the hand arrived; a raised hand has no target.
 
     `floor` is the height in metres of the place from which the hand rises. A `lost` hand was stopped during a motion.
     """

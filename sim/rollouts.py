@@ -74,7 +74,7 @@ class Trial:
 
 
 def wilson(good: int, of: int, z: float = 1.96) -> tuple[float, float]:
-    """Return Wilson's confidence interval, by default at 95 %, of the share of `good` cases among `of` cases.
+    """Return Wilson's confidence interval (95 % by default) of a share, given `good` cases out of `of` cases.
 
     >>> low, high = wilson(98, 100)
     >>> print(f"{low:.3f} {high:.3f}")

@@ -74,7 +74,10 @@ class Run:
         return self.world.links[name], name
 
     def number(self, expression: str, link: str = "") -> float:
-        """Return the value of a sum of settings, numbers and, with `link`, named values of the link's joint (opened, shut, …)."""
+        """Return the value of a sum of settings and numbers.
+
+        With `link`, the sum may contain values of the link's joint (`opened`, `shut`, …).
+        """
         known = dict(self.numbers)
         if "clear" in expression:
             known["clear"] = self.clear()

@@ -166,7 +166,7 @@ def _vary(engine: Engine, shape: Shape, place: str, perturb: Perturbation | None
 
 
 def pour_in(engine: Engine, name: str, filling: str, perturb: Perturbation | None = None) -> None:
-    """Fill a vessel with beads that are released just above its bottom, and that PyBullet draws only in a window."""
+    """Fill a vessel with beads, released just above its bottom; PyBullet draws these beads only in its window."""
     kind = engine.embodiment.fillings[filling]
     share = 1.0 if perturb is None else float(engine.rng.uniform(*perturb.fill))
     count = round(kind.serving * engine.filled.get(name, engine.embodiment.bodies[name].servings) * share)

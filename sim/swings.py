@@ -75,7 +75,7 @@ def _why(link: str, fact: Fact) -> str:
 
 
 def _moving(world: Engine, use: SkillUse, link: str) -> Iterator[str]:
-    """Yield the role of a link in a skill if the skill moves the link until it is shut or opened."""
+    """Yield the roles in which a skill moves a link until the link is shut or opened."""
     one = world.links[link].link(link)
     known = {"opened": one.opened, "shut": one.shut, "lower": one.lower, "upper": one.upper, "wide": wide(one)}
     for phase in use.phases:

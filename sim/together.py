@@ -35,7 +35,7 @@ LOOKING = 6
 
 @dataclass(frozen=True)
 class Performance:
-    """The result of concurrent execution: slots and verdicts of the primitives, and seconds in which the arms touched."""
+    """The result of concurrent execution: time slots and verdicts of the primitives, and seconds in which the arms touched."""
 
     slots: tuple[Slot, ...]
     verdicts: tuple[Verdict, ...]
@@ -83,7 +83,7 @@ class _Job:
 def perform_together(
     world: PhysicsWorld, problem: Problem, primitives: Sequence[Step], room: float = ROOM, most: float = 600.0
 ) -> Performance:
-    """Execute primitives with all hands at once; each primitive starts when its predecessors are done and there is room.
+    """Execute primitives with all hands at once; each starts when its predecessors are done and no other hand works too near.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def _moved_bodies(world: PhysicsWorld, step: Step) -> set[str]:
 def _workplace(
     world: PhysicsWorld, step: Step
 ) -> Callable[[], np.ndarray[tuple[int, ...], np.dtype[np.float64]] | None]:
-    """Return a function that returns the horizontal position (2,) of a primitive's work: of its last body, place or hand."""
+    """Return a function that returns where a primitive works: the horizontal position (2,) of its last body, place or hand."""
     named = (*step.arguments, *step.bindings.values())
     hand = next((name for name in named if name in world.hands), None)
 

@@ -160,7 +160,7 @@ def go_around(run: Run, phase: Phase, name: str, goal: Array) -> None:
 
 
 def room(run: Run, target: str, yaw: Array | None = None) -> float:
-    """Return the distance in metres between an object at a feature and each open finger; infinite for other things.
+    """Return the gap in metres between each open finger and the object with a feature; infinite for a feature of another thing.
 
     The hand has the heading `yaw`, or the heading with the most room.
     """

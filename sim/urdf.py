@@ -281,7 +281,7 @@ def _primitive(shape: ET.Element) -> tuple[Array, float]:
 
 
 def _spread(half: float, radius: float) -> Array:
-    """Return positions from -half to half with gaps of at most the radius."""
+    """Return evenly spaced positions from -`half` to `half`, at most `radius` apart."""
     if half <= 0:
         return np.zeros(1)
     if radius * MOST_SPHERES <= 2 * half:

@@ -17,7 +17,7 @@ from confab.sim.verdict import RolloutJson, StepReportJson, Verdict
 from confab.sim.world import PhysicsWorld, PrimitiveStep
 
 LOOKS = 3
-"""With noisy perception, number of observations after which a difference from the expected state counts."""
+"""Number of noisy observations that are averaged before a difference from the expected state counts."""
 
 
 @known_as("an entry")

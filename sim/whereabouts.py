@@ -73,7 +73,7 @@ def stopping(world: Engine, hand: str) -> Iterator[None]:
 
 
 def floor_below(world: Engine, hand: str, point: Array) -> float:
-    """Return the height of the support that a hand's load has left; if unknown, the height of the place below `point`."""
+    """Return the height of the support from which a hand has lifted its load; if unknown, the height of the place below `point`."""
     at = world.hands[hand].at
     if at.floor is not None and not at.lost:
         return at.floor

@@ -1,4 +1,4 @@
-"""The physical world in which plans are executed: a scene is set up from facts, observed and changed by primitives."""
+"""The physical world in which plans are executed: facts determine its initial scene, and primitives change the scene."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ class HttpRobot:
     Raises
     ------
     RobotError
-        `where` is no URL of this form.
+        `where` isn't an ``http://…`` or ``https://…`` URL.
     """
 
     def __init__(self, where: str) -> None:

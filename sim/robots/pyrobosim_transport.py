@@ -87,7 +87,7 @@ class Pyrobosim:
         return result.status.name, result.message or ""
 
     def _note_search(self, robot: Any) -> None:
-        """Record that the robot has searched its location if the robot knows all objects at the location."""
+        """Mark the robot's location as searched if the robot knows all objects there."""
         there = {thing.name for thing in getattr(robot.location, "children", ())}
         if there <= {thing.name for thing in robot.get_known_objects()}:
             self.searched.add(robot.location.name)
