@@ -587,7 +587,7 @@ def test_an_internal_error_gives_one_line_and_a_log(ask: Ask, monkeypatch: pytes
     def fail(*_: object, **__: object) -> NoReturn:
         raise KeyError("no\nsuch\x1b[2J thing")
 
-    monkeypatch.setattr("confab.scene.load", fail)
+    monkeypatch.setattr("confab.scene.read", fail)
     code, out, err = ask("plan", "beverage-serving")
     assert (code, out, err.count("\n")) == (BUG, "", 1)
     assert "a fault of Confab" in err
@@ -604,7 +604,7 @@ def test_limits_and_interrupts_have_codes_of_their_own(
     def fail(*_: object, **__: object) -> NoReturn:
         raise raised
 
-    monkeypatch.setattr("confab.scene.load", fail)
+    monkeypatch.setattr("confab.scene.read", fail)
     got, out, err = ask("plan", "beverage-serving")
     assert (got, out, err.strip().count("\n")) == (code, "", 0)
 
