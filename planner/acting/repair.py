@@ -278,7 +278,16 @@ def _replay(call: Call, pending: list[Step], wanted: State) -> bool:
         while steps:
             step = steps.pop()
             call.space.check_time()
-            if any(not waiting.isdisjoint(one.arguments) for one in step.together):
+            if step.joined:  # if the joint refinement can't be replayed, its steps are applied one by one
+                done = _redo(call, step)
+                if done is None:
+                    steps += reversed(step.steps)
+                    whole = False
+                else:
+                    call.steps.append(done)
+                    progress = True
+                continue
+            if not waiting.isdisjoint(step.arguments):
                 put_off.append(step)
                 continue
             effects = _effects(call, step)
@@ -289,12 +298,7 @@ def _replay(call: Call, pending: list[Step], wanted: State) -> bool:
             if all(call.table.now[s].get(k) == value for (s, k), value in effects.items()):
                 whole = False
                 continue
-            done = _redo(call, step)
-            if done is None and step.joined:  # each step is refined alone
-                steps += [replace(one, steps=(), joined=()) for one in reversed(step.together)]
-                whole = False
-                continue
-            done = done or call.refiner.do(step.level, step.behavior, step.arguments)
+            done = _redo(call, step) or call.refiner.do(step.level, step.behavior, step.arguments)
             if done is None:
                 put_off.append(step)
                 waiting.update(individual for _, key in effects for individual in arguments_of(key))

@@ -297,7 +297,7 @@ def after_interventions(problem: Problem, draw: random.Random) -> Problem:
         ("swap", 6, 12, 11, 305, 34, 3),
         ("full", 4, 40, 36, 355, 148, 18),
         ("handover", 5, 12, 10, 245, 54, 6),
-        ("blocked", 5, 24, 23, 520, 64, 11),
+        ("blocked", 5, 24, 22, 508, 86, 13),
     ],
 )
 def test_repairs_after_random_interruptions_change_few_steps(
