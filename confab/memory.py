@@ -50,6 +50,8 @@ if TYPE_CHECKING:
     from confab.reasoner.symbols import Problem
 
 
+DISTURBED = "an episode with an intervention teaches only failed behaviours and measured durations"
+"""Message on an episode whose steps aren't learned."""
 MOST_LINKS = 20_000
 """Maximum number of the paper's links in a memory. If a plan would add more links, it adds no links at all, but only rules and
 counts for the default planner.
@@ -227,7 +229,7 @@ class Memory(metaclass=RightNames):
                 raise KnowledgeError(f"no replica '{replica}' in this memory (there: {known})")
             self.trusted.add(replica)
 
-    def live(self, problem: Problem, episode: Episode) -> None:
+    def live(self, problem: Problem, episode: Episode) -> bool:
         """Learn from an execution. After an intervention or a failure, only the failed behaviours are learned, otherwise all steps.
 
         Parameters
@@ -235,6 +237,11 @@ class Memory(metaclass=RightNames):
         problem : Problem
             The problem of the episode's task.
         episode : Episode
+
+        Returns
+        -------
+        bool
+            Whether steps or failures were learned.
         """
         from confab.planner.experience.lessons import live
 
@@ -245,6 +252,8 @@ class Memory(metaclass=RightNames):
         with suppress(LearningError):  # the executed steps aren't applicable in the first observed state
             if whole or failures:
                 live(self.experience, begun, episode.done if whole else Plan(()), failures=failures)
+                return True
+        return False
 
     def measure(self, problem: Problem, done: Episode | Report) -> None:
         """Learn the durations of the primitives that succeeded in an episode, or in the rollouts of a plan in physics.

@@ -197,7 +197,7 @@ class AnyOf:
 
     alternatives: tuple[tuple[Condition, ...], ...]
     negated: bool = False
-    constraint: Constraint | None = field(default=None, compare=False)
+    constraint: Constraint | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True)

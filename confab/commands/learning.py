@@ -22,7 +22,7 @@ from confab.commands.options import (
 from confab.examples import examples
 from confab.progress import progress
 from confab.reasoner.kinds import MEMORY, PICTURE
-from confab.terminal import EXIT, YES, limited, remark, show_result
+from confab.terminal import EXIT, NO, YES, limited, remark, show_result
 
 if TYPE_CHECKING:
     from confab.memory import Memory
@@ -74,7 +74,7 @@ def learn(
     """Learn from solutions of scenes, a demonstration, or episodes."""
     from confab.curve import Curve, require_drawable
     from confab.interchange import read_plan
-    from confab.memory import MOST_LINKS, Memory, undisturbed
+    from confab.memory import DISTURBED, MOST_LINKS, Memory, undisturbed
     from confab.reasoner.files import has_content
 
     remembered: Memory | None = None
@@ -95,7 +95,9 @@ def learn(
                 if demonstration:
                     remembered.learn(loaded, read_plan(demonstration, loaded.problem))
                 for episode in lived:
-                    remembered.live(loaded.problem, loaded.read_episode(episode).episode)
+                    if not remembered.live(loaded.problem, loaded.read_episode(episode).episode):
+                        status = NO
+                        remark(f"{episode}: no steps were learned; {DISTURBED}")
                 advance(f"learned {name}", 2)
             else:
                 result = loaded.plan()
@@ -108,7 +110,7 @@ def learn(
                 advance(f"learning {name}", 1)
                 remembered.teach(loaded, result.plan)
                 advance(f"learned {name}", 1)
-            if remembered.links is links:
+            if remembered.links is links and not lived:
                 remark(f"{name}: would make more than {MOST_LINKS:,} of the paper's links; only rules were learned")
         assert remembered is not None
         if remembered.experience.episodes:

@@ -326,7 +326,7 @@ def execute(
 ) -> None:
     """Execute a task in a closed loop, with repair and replanning."""
     from confab.live import both, spectator
-    from confab.memory import Memory, undisturbed
+    from confab.memory import DISTURBED, Memory, undisturbed
 
     with ExitStack() as stack:
         stack.enter_context(limited(time_limit))
@@ -367,7 +367,8 @@ def execute(
     if learn and memory is not None:
         with undisturbed(memory):  # other processes may have changed the file during the episode
             newest = Memory.load(memory, loaded)
-            newest.live(loaded.problem, execution.episode)
+            if not newest.live(loaded.problem, execution.episode):
+                remark(f"no steps were learned; {DISTURBED}")
             newest.save(memory)
     if save is not None:
         execution.save(save)

@@ -164,3 +164,29 @@ def test_rules_of_a_step_that_failed_in_execution_are_counted_as_failed(scene: c
     failed = {name for name, facts in memory.experience.totals().items() for t in facts.values() if t.failed}
     did = {one.does[0] for name, one in memory.experience.said.items() if name in failed and isinstance(one, Rule)}
     assert did == {episode.planned.steps[0].behavior}
+
+
+@pytest.mark.parametrize(
+    "name", ["drums-small", "tour-small", "carts-small", "wishes-small", "library-small", "towers-small"]
+)
+def test_a_memory_of_a_world_is_saved_and_read_again(name: str, tmp_path: Path) -> None:
+    """The worlds have constraints, remembered situations, totals, soft goals, and steps that are refined together."""
+    world = confab.load(name)
+    memory = confab.Memory.of(world)
+    memory.teach(world, world.plan())
+    memory.save(tmp_path / "memory.ttl")
+    assert confab.Memory.load(tmp_path / "memory.ttl", world).experience == memory.experience
+
+
+def test_commands_report_an_episode_whose_steps_are_not_learned(tmp_path: Path) -> None:
+    memory, episode = tmp_path / "memory.ttl", tmp_path / "episode.json"
+    disturbed = ["execute", "beverage-serving", "--intervene", "after=28 cup2 LOCATION location8"]
+    episode.write_text(CliRunner().invoke(app, [*disturbed, "--json"]).stdout)
+    learned = CliRunner().invoke(app, ["learn", "beverage-serving", "--memory", str(memory), "--episode", str(episode)])
+    assert learned.exit_code == 1
+    assert "no steps were learned; an episode with an intervention teaches only" in learned.stderr
+    assert "20,000" not in learned.stderr
+    confab.Memory.of(scene := confab.load("beverage-serving")).save(memory)
+    executed = CliRunner().invoke(app, [*disturbed, "--memory", str(memory), "--learn"])
+    assert "no steps were learned" in executed.stderr
+    assert not confab.Memory.load(memory, scene).experience.episodes
