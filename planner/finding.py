@@ -79,7 +79,7 @@ def find(places: Sequence[Place], asked: int | str | Sequence[int | str], hint: 
     names = {place.path: [name.lower() for name in place.texts] for place in places}
     for fits in (
         lambda name: words == name or f" {words}" == name[name.find(" ") :],
-        lambda name: words in name,
+        lambda name: re.search(rf"(?<![^\W_]){re.escape(words)}", name) is not None,
     ):
         found = [place for place in places if any(fits(name) for name in names[place.path])]
         tops = [one for one in found if not any(one.path[: len(o.path)] == o.path for o in found if o is not one)]

@@ -227,6 +227,8 @@ def test_a_step_is_selected_by_its_number_its_path_and_its_words(result: confab.
     assert plan["L2#1"] == plan[0, 1] == first.steps[1]
     with pytest.raises(LookupError, match=r"'B2_' names 3 steps: L2#0 .*; give one, e.g. L2#0"):
         plan["B2_"]
+    with pytest.raises(LookupError, match="no step 'our bottle 2' in the plan"):
+        plan["our bottle 2"]  # words begin where the words of the step begin
     with pytest.raises(IndexError, match="the first level has 1, counted from 0"):
         plan[99]
 
