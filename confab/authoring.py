@@ -1,4 +1,4 @@
-"""Tools for authors of domains: write a skeleton, compare two versions of a scene, rename terms in a memory."""
+"""New domains, the differences between two versions of a scene, and the renaming of terms in a memory."""
 
 from __future__ import annotations
 
