@@ -16,6 +16,7 @@ SLEEP = "import subprocess, time; subprocess.Popen(['sleep', '60']); print('up',
 PARENT = f"""
 import ctypes, os, signal, subprocess, sys, threading, time
 from confab.reasoner.workers import start
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell ignores the signal in background jobs
 found = []
 def begin():
     found.append(start([sys.executable, "-c", {SLEEP!r}], stdout=subprocess.PIPE))
@@ -61,7 +62,7 @@ def test_a_process_and_its_children_end_when_its_parent_ends_in_any_way(how: str
     if how in ("kill", "ctrl-c"):
         assert len(group(number)) == 2
         parent.send_signal(signal.SIGKILL if how == "kill" else signal.SIGINT)
-    parent.communicate()
+    parent.communicate(timeout=20)
     assert ended(number)
 
 
