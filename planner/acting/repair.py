@@ -57,7 +57,7 @@ class RepairResult:
 
 @dataclass(frozen=True)
 class Repaired:
-    """The result of a repair: the steps, their cost, and `least`, a lower bound on the cost of every plan for the open goals."""
+    """The result of a repair: the steps, their cost, and `least`, an estimate of the least cost of a plan for the open goals."""
 
     steps: tuple[Step, ...]
     cost: float
@@ -119,7 +119,7 @@ def repair(
 ) -> Repaired | None:
     """Return steps that achieve the open goals and contain as many valid steps of `rest` as possible, or None.
 
-    The lower bound `least` is the total cost of some steps: the step in progress, the planned steps that name no changed
+    The estimate `least` is the total cost of some steps: the step in progress, the planned steps that name no changed
     individual, one step per open goal, and one step per changed individual.
     """
     wanted = planned.goal
