@@ -17,14 +17,14 @@ from confab.reasoner.files import check_folder
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import within
 from confab.reasoner.names import RightNames, right_names
-from confab.reasoner.symbols import FALSE, Fact, State
+from confab.reasoner.symbols import FALSE, Fact, PrimitiveStep, State
 from confab.sim.engine import Engine
 from confab.sim.rollouts import Done, Trial, wilson
 from confab.sim.rollouts import rollouts as roll_out
 from confab.sim.staging import Perturbation
 from confab.sim.verdict import RolloutJson
 from confab.sim.verify import Rollout, expectations
-from confab.sim.world import PhysicsWorld, PrimitiveStep
+from confab.sim.world import PhysicsWorld
 from confab.table import Table
 
 if TYPE_CHECKING:

@@ -12,12 +12,13 @@ from confab.physics import require_skills
 from confab.reasoner.files import write_whole
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.kinds import TRAJECTORIES, stamped
+from confab.reasoner.symbols import PrimitiveStep
 from confab.sim.engine import RATE
 from confab.sim.together import perform_together
 from confab.sim.trajectory import Recorder, exported
 from confab.sim.verdict import Verdict
 from confab.sim.verify import expectations, verify
-from confab.sim.world import PhysicsWorld, PrimitiveStep
+from confab.sim.world import PhysicsWorld
 
 if TYPE_CHECKING:
     from confab.scene import Scene

@@ -25,7 +25,7 @@ from fractions import Fraction
 from functools import cached_property
 from itertools import product
 from math import prod
-from typing import TypeAlias
+from typing import Protocol, TypeAlias
 
 from confab.reasoner.amounts import OPERATIONS, Amount, Calculation, Expression, Quantity, put_in, situations_in
 from confab.reasoner.names import brief, known_as
@@ -498,6 +498,30 @@ class GroundBehavior:
     def __str__(self) -> str:
         """Return the behaviour in the notation of the paper's figures, e.g. ``22 B1_MOVE cup1 location7``."""
         return " ".join((str(self.id), self.behavior, *self.arguments))
+
+
+class PrimitiveStep(Protocol):
+    """A primitive of a plan, such as a `confab.planner.plan.Step`."""
+
+    @property
+    def path(self) -> tuple[int, ...]:
+        """Position in the plan's tree."""
+
+    @property
+    def id(self) -> int:
+        """ID of the grounded behaviour."""
+
+    @property
+    def behavior(self) -> str:
+        """Name of the behaviour."""
+
+    @property
+    def arguments(self) -> tuple[str, ...]:
+        """Individuals for the behaviour's parameters, in order."""
+
+    @property
+    def bindings(self) -> Mapping[str, str]:
+        """Individuals for the variables that the parameters determine."""
 
 
 @known_as("a domain")

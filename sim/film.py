@@ -25,7 +25,7 @@ from confab.sim.picture import DOWN, Camera, hide_vessels, picture, view_of
 from confab.sim.urdf import Array
 
 if TYPE_CHECKING:
-    from confab.sim.world import PrimitiveStep
+    from confab.reasoner.symbols import PrimitiveStep
 
 SIZES = (17, 15, 13, 11)
 """Font sizes of the caption; the first size that fits is used."""

@@ -20,12 +20,12 @@ from typing import Any
 
 from confab.reasoner.embodiment.values import Embodiment
 from confab.reasoner.limits import LimitError, check, current
-from confab.reasoner.symbols import State
+from confab.reasoner.symbols import PrimitiveStep, State
 from confab.reasoner.workers import CPU_SECONDS, end, limit_cpu, start
 from confab.sim.engine import Engine
 from confab.sim.staging import Perturbation
 from confab.sim.verify import Rollout, verify
-from confab.sim.world import PhysicsWorld, PrimitiveStep
+from confab.sim.world import PhysicsWorld
 
 TRIES = 3
 """Number of dead processes after which a rollout is given up."""

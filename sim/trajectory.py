@@ -17,13 +17,13 @@ import numpy as np
 import pybullet
 
 from confab.reasoner.embodiment.values import Embodiment
-from confab.reasoner.symbols import State
+from confab.reasoner.symbols import PrimitiveStep, State
 from confab.sim.arms import hand_frames
 from confab.sim.engine import LAG, RATE, Engine
 from confab.sim.robot import CLOSING, Manipulator
 from confab.sim.staging import Perturbation
 from confab.sim.urdf import Array
-from confab.sim.world import PhysicsWorld, PrimitiveStep
+from confab.sim.world import PhysicsWorld
 
 EXACT = 3e-4
 """Maximum deviation in radians of the exported path from the commanded path; the exported path is linear between its points."""

@@ -9,12 +9,12 @@ from dataclasses import dataclass, field
 from confab.planner.validation import successor
 from confab.reasoner.embodiment.values import Embodiment
 from confab.reasoner.names import brief, known_as
-from confab.reasoner.symbols import FALSE, TRUE, Fact, Problem, State
+from confab.reasoner.symbols import FALSE, TRUE, Fact, PrimitiveStep, Problem, State
 from confab.sim.engine import Clock, Engine
 from confab.sim.perception import perceiver
 from confab.sim.staging import Perturbation
 from confab.sim.verdict import RolloutJson, StepReportJson, Verdict
-from confab.sim.world import PhysicsWorld, PrimitiveStep
+from confab.sim.world import PhysicsWorld
 
 LOOKS = 3
 """Number of noisy observations that are averaged before a difference from the expected state counts."""

@@ -3,46 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from types import TracebackType
-from typing import Protocol
 
 import numpy as np
 
 from confab.reasoner.embodiment.values import Embodiment
 from confab.reasoner.refutations import Refutation
-from confab.reasoner.symbols import Fact, State, Symbol
+from confab.reasoner.symbols import Fact, PrimitiveStep, State, Symbol
 from confab.sim.engine import RATE, Engine
 from confab.sim.perception import Draft, perceiver
 from confab.sim.skills import perform
 from confab.sim.staging import Perturbation, furnish, stage
 from confab.sim.swings import refuted
 from confab.sim.verdict import REFUTED, SkillError, Verdict
-
-
-class PrimitiveStep(Protocol):
-    """A primitive of a plan, such as a `confab.planner.plan.Step`."""
-
-    @property
-    def path(self) -> tuple[int, ...]:
-        """Position in the plan's tree."""
-
-    @property
-    def id(self) -> int:
-        """ID of the grounded behaviour."""
-
-    @property
-    def behavior(self) -> str:
-        """Name of the behaviour."""
-
-    @property
-    def arguments(self) -> tuple[str, ...]:
-        """Individuals for the behaviour's parameters, in order."""
-
-    @property
-    def bindings(self) -> Mapping[str, str]:
-        """Individuals for the variables that the parameters determine."""
 
 
 class PhysicsWorld(Engine):

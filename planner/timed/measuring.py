@@ -3,36 +3,19 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 from fractions import Fraction
-from typing import Protocol
 
 from confab.planner.timed.pieces import actors_of, default_actors, pieces_of
 from confab.reasoner.memory.experience import Measured, Statistics
-from confab.reasoner.symbols import Problem, Times
+from confab.reasoner.symbols import PrimitiveStep, Problem, Times
 
 PARTS = 1000
 """Number of parts of a second to which a mean is rounded."""
 
 
-class Executed(Protocol):
-    """A primitive that was executed, such as a `confab.planner.plan.Step`."""
-
-    @property
-    def behavior(self) -> str:
-        """Name of the behaviour."""
-
-    @property
-    def arguments(self) -> tuple[str, ...]:
-        """Individuals for the behaviour's parameters, in order."""
-
-    @property
-    def bindings(self) -> Mapping[str, str]:
-        """Individuals for the variables that the parameters determine."""
-
-
-def measured(problem: Problem, executed: Iterable[tuple[Executed, float]]) -> Statistics:
+def measured(problem: Problem, executed: Iterable[tuple[PrimitiveStep, float]]) -> Statistics:
     """Return the statistics of executed primitives; behaviours that the problem doesn't have are left out.
 
     Parameters
