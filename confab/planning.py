@@ -494,7 +494,9 @@ class Result(metaclass=RightNames):
         found = find_step(self.plan, step, self.labels)
         return because(self.plan, found, self.purposes[found.path], self.labels)
 
-    def why_not(self, asked: str, instead: AnyStep | None = None, seconds: float | None = None) -> WhyNot:
+    def why_not(
+        self, asked: str | tuple[str, ...] | Step, instead: AnyStep | None = None, seconds: float | None = None
+    ) -> WhyNot:
         """Return why an alternative isn't in the plan.
 
         The answer has the failing conditions of the alternative, or a plan with the alternative and the additional cost of this
@@ -502,7 +504,7 @@ class Result(metaclass=RightNames):
 
         Parameters
         ----------
-        asked : str
+        asked : str, words or Step
             The alternative. An alternative is a goal like ``cup2 LOCATION location8`` or ``cup2 LOCATION location8 by
             left_hand``, or a behaviour like ``B2_PICK right_hand cup1`` or ``B2_PICK hand=right_hand``.
         instead : Step, int, str or path, optional
@@ -514,6 +516,12 @@ class Result(metaclass=RightNames):
         from confab.why import BY, find_step, why_not
 
         check_seconds("seconds", seconds)
+        words = " ".join(several(str(asked) if isinstance(asked, Step) else asked)).split()
+        if words[:1] and words[0].isdecimal():  # the text of a step begins with its ID
+            words = words[1:]
+        if not words:
+            raise KnowledgeError("the alternative is empty; wanted a goal, or a behaviour with individuals")
+        asked = " ".join(words)
 
         def ask(problem: Problem) -> Outcome:
             return solve(Request(problem, DEFAULT_MODE))
@@ -536,7 +544,7 @@ class Result(metaclass=RightNames):
                     raise
                 return self.in_whole_scene().why_not(asked, instead)
             # Plans for other goals come from `replan`, which has checked them.
-            own = asked.split()[:1] and asked.split()[0] in self.problem.domain.behaviors
+            own = words[0] in self.problem.domain.behaviors
             if not own or self.part is None or told.plan is None or not self.faults(told.plan):
                 return told
             return self.in_whole_scene().why_not(asked, instead)

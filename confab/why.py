@@ -245,8 +245,13 @@ def find_step(plan: Plan, asked: int | str | Sequence[int | str] | Step, labels:
     texts = {path: (str(step), labels.name(step.behavior), labels.step(step)) for path, step in steps.items()}
     places = [Place(path, step.level, step.id, texts[path]) for path, step in steps.items()]
     hint = f"steps: {some_of([text for *_, text in texts.values()])}"
+    asked = asked.path if isinstance(asked, Step) else asked
+    if not isinstance(asked, int | str | Sequence):
+        raise KnowledgeError(
+            f"{asked!r} names no step; wanted a step of the plan, a number such as L2#3, a path or words"
+        )
     try:
-        return steps[find(places, asked.path if isinstance(asked, Step) else asked, hint)]
+        return steps[find(places, asked, hint)]
     except UnknownStepError as error:
         raise KnowledgeError(str(error)) from error
 
@@ -368,7 +373,10 @@ def why_not(
         worded_behavior(problem, labels, asked) if behavior is None else (behavior, _given(problem, behavior, rest))
     )
     if worded is not None:
-        found = instead_of(problem, plan, worded[0], dict(worded[1]), ask, instead)
+        try:
+            found = instead_of(problem, plan, worded[0], dict(worded[1]), ask, instead)
+        except NoChoiceError as error:
+            return WhyNot(asked, str(error))
         return _step_told(asked, problem, plan, labels, found, "" if instead else ", where the fewest conditions fail")
     by = BY.search(asked)
     fact = BY.sub("", asked.strip())

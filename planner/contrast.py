@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import product
+from operator import eq
 
 from confab.planner.causal_links import on_level
 from confab.planner.checked_conditions import Bindings
@@ -79,12 +80,22 @@ def instead_of(
     ask : callable
         Function that plans a problem.
     place : Step, optional
-        The step to be replaced, which has the level of `behavior`. By default, the step most similar to the requested step, among
-        all steps in whose place `behavior` is applicable.
+        The step to be replaced. If the level of `behavior` is another one, the steps of this level in or above `place` are
+        candidates. By default, all steps of this level are candidates. Among the candidates in whose place `behavior` is
+        applicable, the step most similar to the requested step is replaced.
+
+    Raises
+    ------
+    NoChoiceError
+        The plan has no step to replace.
     """
     rules, before = BehaviorReader(problem), cost_of(problem, plan)
     course = list(on_level(plan.steps, behavior.level))
-    places = [i for i, step in enumerate(course) if place is None or step.path == place.path]
+    places = [
+        i for i, step in enumerate(course) if place is None or all(map(eq, step.path, place.path))
+    ]  # a path is above another one if it is the beginning of the other one
+    if not places:
+        raise NoChoiceError(f"the plan has no step that {behavior.name} could replace")
     states = _states(problem, course)
     for i in places:
         for one in course[i].together:
@@ -213,14 +224,12 @@ def _fewest_failures(
     rules: BehaviorReader, behavior: Behavior, given: Bindings, places: Sequence[tuple[Step, Facts]], before: float
 ) -> Contrast:
     """Return the position at which the fewest conditions of a behaviour fail, and these conditions."""
-    best: Contrast | None = None
+    found = []
     for step, facts in places:
-        found, lacks = failing_conditions(rules, behavior.preconditions, given, behavior.kinds, (facts,))
-        if best is None or len(lacks) < len(best.lacks):
-            arguments = tuple(found.get(p.name, p.name) for p in behavior.parameters)
-            best = Contrast(before, behavior.name, arguments, step, lacks)
-    assert best is not None, "a plan without steps has no place for another one"
-    return best
+        bindings, lacks = failing_conditions(rules, behavior.preconditions, given, behavior.kinds, (facts,))
+        arguments = tuple(bindings.get(p.name, p.name) for p in behavior.parameters)
+        found.append(Contrast(before, behavior.name, arguments, step, lacks))
+    return min(found, key=lambda one: len(one.lacks))
 
 
 def _refined(

@@ -42,7 +42,8 @@ def find(places: Sequence[Place], asked: int | str | Sequence[int | str], hint: 
     places : sequence of Place
         The places of all steps of a plan; the place of a step comes before the places of its sub-steps.
     asked : int, str or path
-        The step in one of these notations: the number of a step of the first level, counted from 0; ``L3#12`` for step 12 of
+        The step in one of these notations: the number of a step of the first level, counted from 0, or from the end if it is
+        negative; ``L3#12`` for step 12 of
         level 3, counted from 0; a path like ``0.1.2``; or words of the step, also as a tuple.
     hint : str
         The last part of the error message if no step is similar to `asked`.
@@ -54,9 +55,11 @@ def find(places: Sequence[Place], asked: int | str | Sequence[int | str], hint: 
     """
     by_number = {number: path for path, number in numbers(places).items()}
     number_of = {path: number for number, path in by_number.items()}
+    if isinstance(asked, str) and asked.strip().isdecimal():
+        asked = int(asked)
     if isinstance(asked, int):
         first = [place.path for place in places if len(place.path) == 1]
-        if not 0 <= asked < len(first):
+        if not -len(first) <= asked < len(first):
             named = [number_of[place.path] for place in places if place.id == asked]
             more = f"; {asked} is the ID of {', '.join(named[:6])}" if named else ""
             raise UnknownStepError(f"no step {asked}: the first level has {len(first)}, counted from 0{more}")
@@ -73,7 +76,7 @@ def find(places: Sequence[Place], asked: int | str | Sequence[int | str], hint: 
     if re.fullmatch(r"(\d+(\.\d+)*)?", text):
         path = tuple(int(part) for part in text.split(".") if part)
         if path not in number_of:
-            raise UnknownStepError(f"no step at {text} in the tree of the plan")
+            raise UnknownStepError(f"no step at '{text}' in the tree of the plan")
         return path
     words = " ".join(text.lower().split())
     names = {place.path: [name.lower() for name in place.texts] for place in places}

@@ -1,5 +1,6 @@
 """The reason for a step, and the reason against an alternative, in the scene's own words and for any kind of scene."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ import ontology
 from confab.cli import app
 from confab.labels import labels_of
 from confab.lifted import Sayings
+from confab.planner.plan import Plan
 from confab.planner.plan_costs import cost_of
 from confab.planner.validation import validate
 from confab.reasoner.memory.experience import ITSELF
@@ -281,3 +283,46 @@ def test_a_parameter_that_no_condition_determines_takes_any_member_of_its_class(
     result = confab.load(tmp_path / "lamps.ttl").plan(goal="a ON true")
     assert str(result.plan[0]) == "0 LIGHT a left m"
     assert "is possible and costs the same" in str(result.why_not("LIGHT a right"))
+
+
+@pytest.mark.parametrize(
+    ("asked", "place", "replaced"),
+    [
+        ("B2_PICK right_hand cup1", "L1#0", "L2#0"),
+        ("B3_GRASP left_hand", "L1#0", "L3#1"),
+        ("B1_MOVE cup1 location8", "L3#3", "L1#0"),
+    ],
+)
+def test_an_alternative_of_another_level_replaces_a_step_in_or_above_the_named_one(
+    serving: confab.Result, asked: str, place: str, replaced: str
+) -> None:
+    assert f"({replaced})" in serving.why_not(asked, place).answer
+
+
+def test_an_alternative_is_accepted_as_a_step_as_its_text_and_as_words(serving: confab.Result) -> None:
+    step = serving.plan[0]
+    told = {str(serving.why_not(one)) for one in (step, str(step), (step.behavior, *step.arguments))}
+    assert len(told) == 1
+    assert "already has this step" in told.pop()
+
+
+def test_an_alternative_in_a_plan_without_steps_replaces_nothing() -> None:
+    result = confab.load("beverage-serving").plan().in_whole_scene()
+    empty = replace(result, outcome=replace(result.outcome, plan=Plan(())))
+    assert "no step that B1_MOVE could replace" in empty.why_not("B1_MOVE cup1 location8").answer
+
+
+@pytest.mark.parametrize("asked", ["", " ", 3, None])
+def test_an_alternative_without_words_is_refused(serving: confab.Result, asked: str) -> None:
+    with pytest.raises(confab.KnowledgeError, match="wanted a"):
+        serving.why_not(asked)
+
+
+@pytest.mark.parametrize("asked", [None, 1.5, 22, "22"])
+def test_a_value_that_names_no_step_is_refused(serving: confab.Result, asked: str) -> None:
+    with pytest.raises(confab.KnowledgeError, match="no step"):
+        serving.why(asked)
+
+
+def test_a_negative_number_counts_steps_from_the_end(serving: confab.Result) -> None:
+    assert serving.why(-1) == serving.why(serving.plan[-1])
