@@ -1,13 +1,18 @@
-"""Regrouping: a run of consecutive steps of one level becomes the refinement of an upper-level step with the same effect.
+"""Regrouping: consecutive steps of one level become the refinement of steps of the level above with the same effect.
 
-If no single step of the level above has the effect of a run, the run becomes the joint refinement of several steps
+A run is a sequence of consecutive steps between two positions at which all changed symbols that the upper level doesn't see are at
+rest. If no single upper-level step has the effect of a run, the run becomes the joint refinement of several steps
 (docs/levels.md). Each of these upper-level steps takes place during the run: in some state of the run, all facts that the step
 makes true hold.
+
+The function `grouped` first finds an upper-level step for each run (`runs_of_one_step`). While steps stay ungrouped, it takes
+longer and longer runs, and searches for several upper-level steps (`joint_steps`). Finally, it chooses runs that leave as few steps
+ungrouped as possible (`best_division`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from heapq import heappop, heappush
 from itertools import product
@@ -21,7 +26,9 @@ from confab.planner.transitions import Cell, arguments_of
 from confab.reasoner.limits import LimitError
 from confab.reasoner.symbols import FALSE, Behavior, Problem, ValueEffect
 
-Seen: TypeAlias = "tuple[str, ...]"
+Run: TypeAlias = "tuple[int, int]"
+"""The steps between two positions; position n is the position after n steps."""
+View: TypeAlias = "tuple[str, ...]"
 """The values of the changed symbols as a level sees them; a value that the level doesn't see is replaced by an empty text."""
 
 LONGEST = 60
@@ -45,243 +52,275 @@ def under_the_levels_above(problem: Problem, plan: Plan, using: Compiled | None 
     try:
         call = Call(problem, using or compiled(problem), None, 0) if levels else None
         for level in reversed(levels):
-            grouped = _Course(call, steps, level).grouped() if call is not None else steps
-            if grouped == steps:
+            above = grouped(_Views(call, steps, level)) if call is not None else steps
+            if above == steps:
                 break
-            steps = grouped
+            steps = above
     except LimitError:  # the remaining levels stay ungrouped
         pass
     return Plan(renumbered(steps))
 
 
-class _Course:
+def grouped(views: _Views) -> list[Step]:
+    """Return the steps grouped under upper-level steps with the same effects.
+
+    As many steps as possible are grouped, under as few upper-level steps as possible.
+    """
+    groups = runs_of_one_step(views)
+    end = len(views.steps)
+    division = best_division(groups, end)
+    points = views.changing_positions()
+    span, work = 1, WORK
+    while span < 2 * len(points) and any(run not in groups for run in division):
+        ungrouped = {begin for begin, end in division if (begin, end) not in groups}
+        for run in zip(points, (*points[span:], *points[-1:] * span), strict=False):
+            if run not in groups and not ungrouped.isdisjoint(range(*run)):
+                found, work = joint_steps(views, run, work)
+                if found:
+                    groups[run] = found
+        division, span = best_division(groups, end), 2 * span
+    return [node(views, run, groups[run]) if run in groups else views.steps[run[0]] for run in division]
+
+
+def node(views: _Views, run: Run, above: Sequence[Ground]) -> Step:
+    """Return the upper-level step, or the upper-level steps that are refined together, with the steps of a run as sub-steps."""
+    call = views.call
+    views.enter(run[0])
+    made: list[Step] = []
+    for name, arguments in above:
+        done = call.space.forward[name](*arguments)
+        assert done is not None
+        bindings = dict(zip(call.program.variables[name], done[0], strict=True))
+        made.append(Step((), call.problem.id_of(name, arguments), views.level, name, arguments, bindings))
+        call.space.apply(done[1])
+    return replace(made[0], steps=tuple(views.steps[slice(*run)]), joined=tuple(made[1:]))
+
+
+def best_division(groups: Mapping[Run, Collection[Ground]], length: int) -> list[Run]:
+    """Return a division of steps into the runs of groups, and runs of one ungrouped step.
+
+    The division has as few ungrouped steps as possible; among such divisions, it has the fewest upper-level steps, and then the
+    most groups.
+    """
+    begins: dict[int, list[int]] = {}
+    for begin, end in groups:
+        begins.setdefault(end, []).append(begin)
+    # for each position: ungrouped steps, upper-level steps, minus the number of groups, and begin of the last run
+    best: list[tuple[int, int, int, int]] = [(0, 0, 0, 0)]
+    for end in range(1, length + 1):
+        ungrouped, above, minus_groups, _ = best[end - 1]
+        divisions = [(ungrouped + 1, above, minus_groups, end - 1)]
+        for begin in begins.get(end, ()):
+            ungrouped, above, minus_groups, _ = best[begin]
+            divisions.append((ungrouped, above + len(groups[begin, end]), minus_groups - 1, begin))
+        best.append(min(divisions))
+    division: list[Run] = []
+    while length:
+        division.append((best[length][-1], length))
+        length = best[length][-1]
+    return division[::-1]
+
+
+# ------------------------------------------------------------------------------------------ upper-level steps of a run
+
+
+def runs_of_one_step(views: _Views) -> dict[Run, list[Ground]]:
+    """Return the runs that have the effect of a single upper-level step, each with this step."""
+    found: dict[Run, list[Ground]] = {}
+    for begin in views.resting:
+        last = min(begin + LONGEST, len(views.steps))
+        views.enter(begin)
+        step_to = {after: step for step, after in views.successors(candidates(views, (begin, last)))}
+        for end in views.resting:
+            after = views.at[end]
+            if begin < end <= last and after != views.at[begin] and after in step_to:
+                found[begin, end] = [step_to[after]]
+    return found
+
+
+def joint_steps(views: _Views, run: Run, work: int) -> tuple[list[Ground], int]:
+    """Return upper-level steps that together have the effect of a run, and the remaining work.
+
+    The best-first search prefers states with few wrong values. Among these, it prefers states whose new facts hold early in the
+    run. If the search fails, return no steps.
+    """
+    course, tried = views.at[run[0] : run[1] + 1], candidates(views, run)
+    first, last = course[0], course[-1]
+    holding_at: dict[frozenset[tuple[int, str]], int | None] = {}  # the first position at which new facts hold together
+    before: dict[View, tuple[View, Ground]] = {}
+    waiting = [(0, 0, 0, first)]
+    while waiting and work > 0 and last not in before:
+        *_, state = heappop(waiting)
+        views.enter(run[0], state)
+        work -= len(tried)
+        for step, after in views.successors(tried):
+            if after == first or after in before:
+                continue
+            new = views.new_facts(state, after)
+            if new not in holding_at:
+                work -= len(course)
+                holding = (at for at, view in enumerate(course) if all(view[i] == value for i, value in new))
+                holding_at[new] = next(holding, None)
+            if (at := holding_at[new]) is not None:
+                before[after] = state, step
+                wrong = sum(value != wanted for value, wanted in zip(after, last, strict=True))
+                heappush(waiting, (wrong, at, len(before), after))
+    found, state = list[Ground](), last
+    while state in before:
+        state, step = before[state]
+        found.append(step)
+    return without_needless(views, run, found[::-1], work)
+
+
+def without_needless(views: _Views, run: Run, steps: list[Ground], work: int) -> tuple[list[Ground], int]:
+    """Return the steps without which the joint effect isn't the effect of the run, and the remaining work."""
+    for position in reversed(range(len(steps))):
+        fewer = steps[:position] + steps[position + 1 :]
+        work -= len(fewer)
+        if work > 0 and views.leads(run, fewer):
+            steps = fewer
+    return steps, work
+
+
+def candidates(views: _Views, run: Run) -> list[Ground]:
+    """Return the upper-level steps that could make one of the facts true that become true during a run."""
+    problem, (begin, end) = views.call.problem, run
+    facts = dict[tuple[Cell, str], None]()
+    for before, after in zip(views.at[begin:end], views.at[begin + 1 : end + 1], strict=True):
+        if before != after:
+            facts.update(((cell, after[i]), None) for cell, i in views.place.items() if before[i] != after[i])
+    found = dict[Ground, None]()
+    for cell, value in facts:
+        for behavior in problem.domain.at_level(views.level):
+            found.update(dict.fromkeys(instances(problem, behavior, cell, value)))
+    return list(found)
+
+
+def instances(problem: Problem, behavior: Behavior, cell: Cell, value: str) -> Iterator[Ground]:
+    """Yield the instances of a behaviour whose most specific effect could give a value to a symbol."""
+    names = {p.name for p in behavior.parameters}
+    effect = max(
+        (effect for effect in behavior.every_effect if not effect.when),
+        key=lambda effect: len(names & {*effect.arguments, getattr(effect, "value", "")}),
+        default=None,
+    )
+    if effect is None or effect.situation != cell[0]:
+        return
+    pairs = [*zip(effect.arguments, arguments_of(cell[1]), strict=True)]
+    pairs += [(effect.value, value)] if isinstance(effect, ValueEffect) else []
+    terms: dict[str, str] = {}
+    for term, individual in pairs:
+        if terms.setdefault(term, individual) != individual or (term not in behavior.kinds and term != individual):
+            return
+    members = problem.members
+    choices = [[terms[p.name]] if p.name in terms else sorted(members(p.kind)) for p in behavior.parameters]
+    if prod(map(len, choices)) <= MOST_FILLED:
+        for arguments in product(*choices):
+            if all(one in members(p.kind) for one, p in zip(arguments, behavior.parameters, strict=True)):
+                yield behavior.name, arguments
+
+
+# ------------------------------------------------------------------------------------------------------------- the states
+
+
+class _Views:
     """The states before and after some steps, as the level above the steps sees them.
 
-    `values` contains the values that differ from the initial state, and `seen` the values that the level sees.
+    `at` contains the view at each position, and `place` the place of each changed symbol in a view. At the positions in `resting`,
+    all changed symbols that the level doesn't see are at rest.
     """
 
     def __init__(self, call: Call, steps: Sequence[Step], level: int) -> None:
         self.call, self.steps, self.level = call, steps, level
-        self.problem, self.table = call.problem, call.table
-        self.values: list[dict[Cell, str]] = [{}]
-        self.resting, restless = [0], set[Cell]()
-        situations = self.problem.domain.situations
-        touched = dict[Cell, None]()
-        self.table.undo(0)
-        for number, step in enumerate(steps, 1):
-            call.space.check_time()
-            mark = len(self.table.trail)
-            for one in Plan((step,)).primitives:
-                done = call.space.forward[one.behavior](*one.arguments)
-                if done is not None:
-                    call.space.apply(done[1])
-            for cell in self.table.before(mark):
-                touched[cell] = None
-                if situations[cell[0]].level > level and cell[0] in call.space.rest:
-                    rests = self.table.now[cell[0]][cell[1]] == call.space.rest[cell[0]]
-                    (restless.discard if rests else restless.add)(cell)
-            self.values.append(self.table.since(0))
-            if not restless:
-                self.resting.append(number)
+        self.resting = [0]
+        self._values: list[dict[Cell, str]] = [{}]  # the values that differ from the initial state, at each position
+        touched = self._apply_all()
+        situations = call.problem.domain.situations
         self.place = {cell: i for i, cell in enumerate(cell for cell in touched if call.space.visible(level, cell))}
-        self.counted = {i for cell, i in self.place.items() if situations[cell[0]].quantity is not None}
-        self.seen: list[Seen] = []
-        for values in self.values:
-            self.table.undo(0)
-            self.table.put_all(values)
-            self.seen.append(self.now())
-        self.table.undo(0)
+        self._amounts = {i for cell, i in self.place.items() if situations[cell[0]].quantity is not None}
+        self.at: list[View] = []
+        for values in self._values:
+            call.table.undo(0)
+            call.table.put_all(values)
+            self.at.append(self._now())
+        call.table.undo(0)
 
-    def now(self) -> Seen:
-        """Return the values of the table that the level sees."""
-        now, levels = self.table.now, self.problem.value_levels
-        values = (now[cell[0]].get(cell[1], FALSE) for cell in self.place)
-        return tuple("" if levels.get(value, 1) > self.level else value for value in values)
+    def _apply_all(self) -> dict[Cell, None]:
+        """Apply the primitives of all steps, record the states between the steps, and return the changed symbols."""
+        table, space = self.call.table, self.call.space
+        situations = self.call.problem.domain.situations
+        touched, restless = dict[Cell, None](), set[Cell]()
+        table.undo(0)
+        for position, step in enumerate(self.steps, 1):
+            space.check_time()
+            mark = len(table.trail)
+            for one in Plan((step,)).primitives:
+                done = space.forward[one.behavior](*one.arguments)
+                if done is not None:
+                    space.apply(done[1])
+            for cell in table.before(mark):
+                touched[cell] = None
+                if situations[cell[0]].level > self.level and cell[0] in space.rest:
+                    rests = table.now[cell[0]][cell[1]] == space.rest[cell[0]]
+                    (restless.discard if rests else restless.add)(cell)
+            self._values.append(table.since(0))
+            if not restless:
+                self.resting.append(position)
+        return touched
 
-    # ---------------------------------------------------------------------------------------------------------- groups
+    def changing_positions(self) -> list[int]:
+        """Return the positions at rest whose view differs from the previous one, with the first and the last position."""
+        pairs = zip(self.resting, self.resting[1:], strict=False)
+        return [0, *(i for before, i in pairs if i == len(self.steps) or self.at[i] != self.at[before])]
 
-    def grouped(self) -> list[Step]:
-        """Return the steps grouped under steps of the level with the same effects.
+    def new_facts(self, before: View, after: View) -> frozenset[tuple[int, str]]:
+        """Return the places and values in which a view differs from the view before; amounts are left out."""
+        pairs = enumerate(zip(before, after, strict=True))
+        return frozenset((i, value) for i, (old, value) in pairs if value != old and i not in self._amounts)
 
-        As many steps as possible are grouped, under as few steps of the level as possible. At the begin and at the end of a group,
-        all changed symbols that the level doesn't see are at rest.
+    def enter(self, position: int, view: View | None = None) -> None:
+        """Bring the table to the state at a position; the level then sees the values of `view`, if given."""
+        table, there = self.call.table, self.at[position]
+        table.undo(0)
+        table.put_all(self._values[position])
+        if view is not None and view != there:
+            table.put_all({cell: view[i] for cell, i in self.place.items() if view[i] != there[i]})
+
+    def successors(self, steps: Iterable[Ground]) -> Iterator[tuple[Ground, View]]:
+        """Yield the upper-level steps that are applicable in the table, each with the view afterwards.
+
+        Steps that change other symbols than the steps below are left out.
         """
-        seen, resting, end = self.seen, self.resting, len(self.steps)
-        # for two positions, the steps of the upper level under which the steps between the positions are grouped
-        groups: dict[tuple[int, int], list[Ground]] = {}
-        for i in resting:
-            self.enter(i)
-            last = min(i + LONGEST, end)
-            ways = {after: ground for ground, after in self.successors(self.candidates(i, last))}
-            for j in resting:
-                if i < j <= last and seen[j] != seen[i] and seen[j] in ways:
-                    groups[i, j] = [ways[seen[j]]]
-        best = _fewest(groups, end)
-        points = [i for k, i in enumerate(resting) if k == 0 or i == end or seen[i] != seen[resting[k - 1]]]
-        span, work = 1, WORK
-        while span < 2 * len(points) and any(pair not in groups for pair in best):
-            alone = {i for i, j in best if (i, j) not in groups}
-            for i, j in zip(points, (*points[span:], *points[-1:] * span), strict=False):
-                if (i, j) not in groups and not alone.isdisjoint(range(i, j)):
-                    found, work = self.leading(i, j, work)
-                    if found:
-                        groups[i, j] = found
-            best, span = _fewest(groups, end), 2 * span
-        return [self.node(i, j, groups.get((i, j))) for i, j in best]
-
-    def node(self, begin: int, end: int, grounds: Sequence[Ground] | None) -> Step:
-        """Return the upper-level step, or the steps that are refined together, above the steps between two positions."""
-        if grounds is None:
-            return self.steps[begin]
-        self.enter(begin)
-        made: list[Step] = []
-        for name, arguments in grounds:
-            done = self.call.space.forward[name](*arguments)
-            assert done is not None
-            bindings = dict(zip(self.call.program.variables[name], done[0], strict=True))
-            made.append(Step((), self.problem.id_of(name, arguments), self.level, name, arguments, bindings))
-            self.call.space.apply(done[1])
-        return replace(made[0], steps=tuple(self.steps[begin:end]), joined=tuple(made[1:]))
-
-    def leading(self, begin: int, end: int, left: int) -> tuple[list[Ground], int]:
-        """Return steps of the level that lead from one position to another, and the remaining work.
-
-        The search prefers states with few wrong values. Among these, it prefers states whose new facts hold early in the sequence
-        of the given steps. If the search fails, return no steps.
-        """
-        course, candidates = self.seen[begin : end + 1], self.candidates(begin, end)
-        first, last = course[0], course[-1]
-        made: dict[frozenset[tuple[int, str]], int | None] = {}  # the first position at which new facts hold together
-        before: dict[Seen, tuple[Seen, Ground]] = {}
-        waiting = [(0, 0, 0, first)]
-        while waiting and left > 0 and last not in before:
-            *_, state = heappop(waiting)
-            self.enter(begin, state)
-            left -= len(candidates)
-            for ground, after in self.successors(candidates):
-                if after == first or after in before:
-                    continue
-                facts = enumerate(zip(state, after, strict=True))
-                new = frozenset((i, value) for i, (old, value) in facts if value != old and i not in self.counted)
-                if new not in made:
-                    left -= len(course)
-                    holding = (at for at, other in enumerate(course) if all(other[i] == value for i, value in new))
-                    made[new] = next(holding, None)
-                if (at := made[new]) is not None:
-                    before[after] = state, ground
-                    wrong = sum(value != wanted for value, wanted in zip(after, last, strict=True))
-                    heappush(waiting, (wrong, at, len(before), after))
-        found, state = list[Ground](), last
-        while state in before:
-            state, ground = before[state]
-            found.append(ground)
-        found.reverse()
-        for position in reversed(range(len(found))):
-            fewer = found[:position] + found[position + 1 :]
-            left -= len(fewer)
-            if left > 0 and self.leads(begin, fewer, last):
-                found = fewer
-        return found, left
-
-    def leads(self, begin: int, grounds: Iterable[Ground], last: Seen) -> bool:
-        """Return whether steps of the level are applicable from a position, and lead to a state."""
-        self.enter(begin)
-        for name, arguments in grounds:
-            done = self.call.space.forward[name](*arguments)
-            if done is None:
-                return False
-            self.call.space.apply(done[1])
-        return self.now() == last
-
-    # --------------------------------------------------------------------------------------------- steps of the level
-
-    def enter(self, position: int, seen: Seen | None = None) -> None:
-        """Bring the table to the state at a position; the level then sees the values `seen`, if given."""
-        self.table.undo(0)
-        self.table.put_all(self.values[position])
-        if seen is not None and seen != self.seen[position]:
-            there = self.seen[position]
-            self.table.put_all({cell: seen[i] for cell, i in self.place.items() if seen[i] != there[i]})
-
-    def successors(self, candidates: Iterable[Ground]) -> Iterator[tuple[Ground, Seen]]:
-        """Yield the applicable candidates, each with the values that the level sees afterwards.
-
-        Candidates that change a symbol that the steps don't change are left out.
-        """
-        self.call.space.check_time()
-        state, levels = self.now(), self.problem.value_levels
-        for name, arguments in candidates:
-            done = self.call.space.forward[name](*arguments)
+        now, space = self.call.table.now, self.call.space
+        space.check_time()
+        view = self._now()
+        for name, arguments in steps:
+            done = space.forward[name](*arguments)
             if done is None:
                 continue
-            after = list(state)
+            after = list(view)
             for situation, key, value in done[1]:
                 place = self.place.get((situation, key))
                 if place is not None:
-                    after[place] = "" if levels.get(value, 1) > self.level else value
-                elif self.table.now[situation].get(key, FALSE) != value:
+                    after[place] = self._seen(value)
+                elif now[situation].get(key, FALSE) != value:
                     break
             else:
                 yield (name, arguments), tuple(after)
 
-    def candidates(self, begin: int, end: int) -> list[Ground]:
-        """For all facts that become true between two positions, return the steps of the level that could make one of them true."""
-        found = dict[Ground, None]()
-        facts = dict[tuple[Cell, str], None]()
-        for before, after in zip(self.seen[begin:end], self.seen[begin + 1 : end + 1], strict=True):
-            if before != after:
-                facts.update(((cell, after[i]), None) for cell, i in self.place.items() if before[i] != after[i])
-        for cell, value in facts:
-            for behavior in self.problem.domain.at_level(self.level):
-                found.update(dict.fromkeys(self.filled(behavior, cell, value)))
-        return list(found)
+    def leads(self, run: Run, steps: Iterable[Ground]) -> bool:
+        """Return whether upper-level steps are applicable at the begin of a run, and lead to the view at its end."""
+        self.enter(run[0])
+        for name, arguments in steps:
+            done = self.call.space.forward[name](*arguments)
+            if done is None:
+                return False
+            self.call.space.apply(done[1])
+        return self._now() == self.at[run[1]]
 
-    def filled(self, behavior: Behavior, cell: Cell, value: str) -> Iterator[Ground]:
-        """Yield the instances of a behaviour whose most specific effect could give a value to a symbol."""
-        names = {p.name for p in behavior.parameters}
-        effect = max(
-            (effect for effect in behavior.every_effect if not effect.when),
-            key=lambda effect: len(names & {*effect.arguments, getattr(effect, "value", "")}),
-            default=None,
-        )
-        if effect is None or effect.situation != cell[0]:
-            return
-        pairs = [*zip(effect.arguments, arguments_of(cell[1]), strict=True)]
-        pairs += [(effect.value, value)] if isinstance(effect, ValueEffect) else []
-        terms: dict[str, str] = {}
-        for term, individual in pairs:
-            if terms.setdefault(term, individual) != individual or (term not in behavior.kinds and term != individual):
-                return
-        members = self.problem.members
-        choices = [[terms[p.name]] if p.name in terms else sorted(members(p.kind)) for p in behavior.parameters]
-        if prod(map(len, choices)) <= MOST_FILLED:
-            for arguments in product(*choices):
-                if all(one in members(p.kind) for one, p in zip(arguments, behavior.parameters, strict=True)):
-                    yield behavior.name, arguments
+    def _now(self) -> View:
+        now = self.call.table.now
+        return tuple(self._seen(now[cell[0]].get(cell[1], FALSE)) for cell in self.place)
 
-
-def _fewest(groups: Mapping[tuple[int, int], Sequence[Ground]], length: int) -> list[tuple[int, int]]:
-    """Return a division of steps into groups and single steps, each as its begin and its end.
-
-    The division has as few single steps as possible; among such divisions, it has the fewest upper-level steps, and then the
-    most groups.
-    """
-    best: list[tuple[int, int, int, int]] = [
-        (0, 0, 0, 0)
-    ]  # single steps, upper steps, minus groups, begin of the last part
-    of_end: dict[int, list[int]] = {}
-    for begin, end in groups:
-        of_end.setdefault(end, []).append(begin)
-    for end in range(1, length + 1):
-        alone, many, fewer, _ = best[end - 1]
-        ways = [(alone + 1, many, fewer, end - 1)]
-        for begin in of_end.get(end, ()):
-            alone, many, fewer, _ = best[begin]
-            ways.append((alone, many + len(groups[begin, end]), fewer - 1, begin))
-        best.append(min(ways))
-    found: list[tuple[int, int]] = []
-    end = length
-    while end:
-        found.append((best[end][-1], end))
-        end = best[end][-1]
-    return found[::-1]
+    def _seen(self, value: str) -> str:
+        return "" if self.call.problem.value_levels.get(value, 1) > self.level else value
