@@ -87,7 +87,7 @@ def _said(runs: list[Run], lama: list[Run]) -> str:
 
 def solve(domain: str, problem: str, target: str, memory: str | None = None) -> None:
     """Solve one problem in a benchmarked process, and write its plan."""
-    from confab.planner.experience.advice import Memory, plan
+    from confab.planner.experience.advice import Advisor, plan
     from confab.planner.plan import Limits
     from confab.planner.validation import validate
     from confab.reasoner.memory.experience_file import load
@@ -96,7 +96,7 @@ def solve(domain: str, problem: str, target: str, memory: str | None = None) -> 
     from confab.reasoner.pddl.syntax import parse_files
 
     scene = imported(parse_files(Path(domain), Path(problem)))
-    known = None if memory is None else Memory(load(Path(memory), Names(())))
+    known = None if memory is None else Advisor(load(Path(memory), Names(())))
     outcome = plan(scene.problem, known, limits=Limits(expansions=10**9))  # the process ends with its CPU seconds
     print(outcome.status, outcome.search)
     if outcome.plan is not None:

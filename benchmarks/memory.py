@@ -24,7 +24,7 @@ from time import process_time
 
 import confab
 from confab import ontology
-from confab.planner.experience.advice import Memory, plan
+from confab.planner.experience.advice import Advisor, plan
 from confab.planner.experience.following import rules_in
 from confab.planner.experience.lessons import live, teach
 from confab.planner.hierarchical import planner as fast
@@ -85,7 +85,7 @@ def shown(outcome: Outcome, seconds: float, within: Problem) -> str:
     return f"{length} | {expanded(outcome, within)} ({whole}) | {seconds:.2f}"
 
 
-def beside(name: str, within: Problem, memory: Memory) -> None:
+def beside(name: str, within: Problem, memory: Advisor) -> None:
     """Print a row of a problem, planned without memory and with memory in the default mode."""
     limits = Limits(seconds=SECONDS)
     none = measured(lambda: fast.plan(within, limits=limits), within)
@@ -131,14 +131,14 @@ def worlds() -> None:
             experience = Experience("lesson")
             teach(experience, confab.load(str(small)).problem)
             if large.exists():
-                beside(small.stem.removesuffix("-small"), confab.load(str(large)).problem, Memory(experience))
+                beside(small.stem.removesuffix("-small"), confab.load(str(large)).problem, Advisor(experience))
     lab = SHARED / "cases" / "lab" / "lab-scene.ttl"
     if lab.exists():
         scene, experience = confab.load(str(lab)).problem, Experience("lesson")
         for lessons in (1, 10):
             while experience.episodes.get("lesson", 0) < lessons:
                 teach(experience, scene)
-            beside(f"lab, {lessons} lessons", scene, Memory(experience))
+            beside(f"lab, {lessons} lessons", scene, Advisor(experience))
 
 
 def curve(world: str = "laboratory", episodes: int = 3) -> None:
@@ -149,7 +149,7 @@ def curve(world: str = "laboratory", episodes: int = 3) -> None:
     print(f"| without memory | {shown(*measured(lambda: fast.plan(large), large), large)} | – |", flush=True)
     teach(experience, small)
     for number in range(episodes):
-        led, seconds = measured(lambda: plan(large, Memory(experience)), large)
+        led, seconds = measured(lambda: plan(large, Advisor(experience)), large)
         before = "a lesson in the small world" if not number else f"{number} episode{'s' * (number > 1)} more"
         print(f"| after {before} | {shown(led, seconds, large)} | {len(rules_in(experience))} |", flush=True)
         if led.plan is not None:
@@ -200,11 +200,11 @@ def pddl() -> None:
         name = "/".join(domain.parent.parts[-2:])
         print(f"| **{name}**, {len(rules_in(experience))} rules in {process_time() - begin:.1f} s | | | | | | |")
         for file in testing:
-            beside(f"{file.parent.name}/{file.stem}", imported(parse_files(domain, file)).problem, Memory(experience))
+            beside(f"{file.parent.name}/{file.stem}", imported(parse_files(domain, file)).problem, Advisor(experience))
 
 
 @cache
-def bad_memories() -> dict[str, Memory]:
+def bad_memories() -> dict[str, Advisor]:
     """Return memories with right rules, with wrong rules, and with rules of another domain, by name."""
     good = taught(FAMILIES)
     rules = rules_in(good.experience)
@@ -221,7 +221,7 @@ def bad_memories() -> dict[str, Memory]:
     ):
         experience = Experience(name)
         experience.learn(Lesson(said=list(those)))
-        found[name] = Memory(experience)
+        found[name] = Advisor(experience)
     return found
 
 

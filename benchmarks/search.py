@@ -35,7 +35,7 @@ from typing import Any
 
 from benchmarks._beside import beside_peers, optimal_costs
 from benchmarks.pddl import peers
-from confab.planner.experience.advice import Memory
+from confab.planner.experience.advice import Advisor
 from confab.planner.experience.advice import plan as guided
 from confab.planner.experience.lessons import teach
 from confab.planner.grounded.best_first import plan_level
@@ -372,7 +372,7 @@ class Forgetful(dict[str, list[Method]]):
         return default
 
 
-def variants(problem: Problem, memory: Memory) -> dict[str, Callable[[], Outcome]]:
+def variants(problem: Problem, memory: Advisor) -> dict[str, Callable[[], Outcome]]:
     """Return planning calls that each omit one part of the planner, by the name of the part."""
     limits, level = Limits(expansions=10**7), problem.domain.levels[-1]
     only = {behavior.name: behavior for behavior in problem.domain.at_level(level)}
@@ -396,7 +396,7 @@ def parts() -> None:
     experience = Experience("lessons")
     for family, objects, seed in product(("served", "swap", "full"), (4, 6), (100, 101)):
         teach(experience, lesson(family, objects, seed))
-    memory = Memory(experience)
+    memory = Advisor(experience)
     print("| family | n | without | status | CPU ms | expansions 1/2/3 | primitives |")
     print("|---|---|---|---|---|---|---|")
     cases = [(family, n) for family in ("served", "swap") for n in (4, 10, 50)]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from confab.lifted import Sayings
 from confab.page.markup import styled, tag
-from confab.planner.experience.advice import Memory as Advisor
+from confab.planner.experience.advice import Advisor
 from confab.planner.experience.evidence import FactReader
 from confab.planner.experience.following import RulePolicy
 from confab.planner.experience.instances import RuleInstance

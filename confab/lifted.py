@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from confab.labels import Labels
 from confab.reasoner.amounts import LESS, MORE
-from confab.reasoner.memory.experience import GoalKind, Method, Order, Rule, Said
+from confab.reasoner.memory.experience import GoalKind, LearnedRule, Method, Order, Said
 from confab.reasoner.sentences import said as plainly
 from confab.reasoner.symbols import (
     Condition,
@@ -78,14 +78,14 @@ class Sayings:
         put = {p.name: self.name(term) for p, term in zip(known.parameters, terms, strict=True)}
         return self.labels.behavior(known, put)
 
-    def goal(self, rule: Rule) -> str:
+    def goal(self, rule: LearnedRule) -> str:
         """Return the goal of a rule as a sentence."""
         if rule.goal.value in (MORE, LESS):
             who = " ".join(map(self.name, rule.goal.arguments))
             return f"the amount “{self.name(rule.goal.situation)}” of {who} {'in' if rule.goal.value == MORE else 'de'}creases"
         return self.fact(Fact(Symbol(rule.goal.situation, rule.goal.arguments), rule.goal.value))
 
-    def rule(self, rule: Rule) -> str:
+    def rule(self, rule: LearnedRule) -> str:
         """Return a rule as a sentence."""
         said = sorted(rule.asks, key=lambda c: isinstance(c, Witness | RelationCondition))
         asks = [self.condition(c) for c in said]
@@ -97,7 +97,7 @@ class Sayings:
     def said(self, one: Said) -> str:
         """Return a learned rule, order of goals, method or kind of goal as a sentence."""
         match one:
-            case Rule():
+            case LearnedRule():
                 return self.rule(one)
             case Order(first, then, shared):
                 same = " of the same individual" if shared else ""

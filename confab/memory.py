@@ -25,10 +25,10 @@ from confab.reasoner.memory.experience import (
     Experience,
     Fact,
     GoalKind,
+    LearnedRule,
     LearningError,
     Method,
     Order,
-    Rule,
     Statistics,
     Tally,
 )
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from confab.lifted import Sayings
     from confab.physics import Report
     from confab.planner.acting.episode import Episode
-    from confab.planner.experience.advice import Memory as Advisor
+    from confab.planner.experience.advice import Advisor
     from confab.reasoner.symbols import Problem
 
 
@@ -318,7 +318,7 @@ class Memory(metaclass=RightNames):
     @property
     def advisor(self) -> Advisor:
         """The memory in the form that the default planner uses."""
-        from confab.planner.experience.advice import Memory as Advisor
+        from confab.planner.experience.advice import Advisor
 
         mine = {self.experience.replica, *self.trusted}
         return Advisor(self.experience, trusted=set(self.experience.episodes) <= mine)
@@ -343,7 +343,7 @@ class Memory(metaclass=RightNames):
     def advice(self, most: int | None = None) -> Table:
         """Return a table of the learned rules with their counts, ordered by kind of goal."""
         say, totals = self.sayings(), self.experience.totals()
-        rules = [one for one in self.experience.said.values() if isinstance(one, Rule)]
+        rules = [one for one in self.experience.said.values() if isinstance(one, LearnedRule)]
         rows = []
         for rule in sorted(rules, key=lambda r: (r.goals.situation, r.goals.classes, r.goal.value, r.does, r.name)):
             t = totals.get(rule.name, {}).get(ITSELF, Tally())
@@ -416,7 +416,7 @@ class Memory(metaclass=RightNames):
         links = f"{counted(len(self.links), 'link')} of {counted(len(self.links.tables), 'behaviour')}"
         kinds = [
             counted(sum(isinstance(one, kind) for one in self.experience.said.values()), noun)
-            for kind, noun in ((Rule, "rule"), (Order, "order of goals"), (Method, "method"))
+            for kind, noun in ((LearnedRule, "rule"), (Order, "order of goals"), (Method, "method"))
         ]
         kinds[1] = kinds[1].replace("order of goalss", "orders of goals")
         return f"{lived} so far: {', '.join(kinds)}; of the paper's memory {links}."

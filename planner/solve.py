@@ -30,7 +30,7 @@ from confab.reasoner.limits import Deadline, OutOfTimeError, within
 from confab.reasoner.symbols import GroundBehavior, Problem
 
 if TYPE_CHECKING:
-    from confab.planner.experience.advice import Memory
+    from confab.planner.experience.advice import Advisor
     from confab.reasoner.memory.links import Links
 
 Mode: TypeAlias = Literal["guarded", "leading", "strict", "optimal", "paper"]
@@ -68,7 +68,7 @@ class Request:
     problem: Problem
     mode: str = DEFAULT_MODE
     limits: Limits = field(default_factory=Limits)
-    memory: Memory | None = None
+    memory: Advisor | None = None
     links: Links | None = None
     grounds: Mapping[int, tuple[GroundBehavior, ...]] | None = None
     leave_levels: bool = True

@@ -8,11 +8,11 @@ from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
-from confab.planner.experience.advice import Memory
+from confab.planner.experience.advice import Advisor
 from confab.planner.experience.lessons import teach
 from confab.reasoner.generate import generate
 from confab.reasoner.graph.knowledge import load
-from confab.reasoner.memory.experience import Experience, Rule
+from confab.reasoner.memory.experience import Experience, LearnedRule
 from confab.reasoner.reading.problem import Reading, read
 from confab.reasoner.reading.relevance import recognise
 from confab.reasoner.symbols import Problem, ValueCondition
@@ -54,7 +54,7 @@ def single_level(problem: Problem, level: int) -> Problem:
     return replace(problem, domain=replace(problem.domain, behaviors=behaviors))
 
 
-def backwards(rule: Rule) -> Rule:
+def backwards(rule: LearnedRule) -> LearnedRule:
     """Return a wrong rule, with the goal and the opposite condition exchanged or, if impossible, with half of the conditions."""
     for c in rule.asks:
         same = isinstance(c, ValueCondition) and (c.situation, c.arguments) == (
@@ -67,11 +67,11 @@ def backwards(rule: Rule) -> Rule:
 
 
 @lru_cache(maxsize=8)
-def taught(families: Sequence[str] = ("served", "swap"), level: int = 1, seeds: Sequence[int] = (100,)) -> Memory:
+def taught(families: Sequence[str] = ("served", "swap"), level: int = 1, seeds: Sequence[int] = (100,)) -> Advisor:
     """Return a memory that has learned from scenes of 4 and 6 objects."""
     experience = Experience("taught")
     for family in families:
         for objects in (4, 6):
             for seed in seeds:
                 teach(experience, single_level(problem(family, objects, seed), level))
-    return Memory(experience)
+    return Advisor(experience)

@@ -26,12 +26,12 @@ from confab.planner.hierarchical.call import Call, Compiled
 from confab.planner.hierarchical.methods import Roles
 from confab.planner.plan import Limits, Outcome, paused_collection
 from confab.reasoner.amounts import meets
-from confab.reasoner.memory.experience import ITSELF, Counts, Experience, Method, Order, Rule, Tally
+from confab.reasoner.memory.experience import ITSELF, Counts, Experience, LearnedRule, Method, Order, Tally
 from confab.reasoner.symbols import Problem
 
 
 @dataclass
-class Memory:
+class Advisor:
     """Experience in the form that the planner uses.
 
     Parameters
@@ -45,7 +45,7 @@ class Memory:
     trusted: bool = True
 
     @cached_property
-    def rules(self) -> list[Rule]:
+    def rules(self) -> list[LearnedRule]:
         """The rules that the planner may follow."""
         return rules_in(self.experience)
 
@@ -64,15 +64,15 @@ class Memory:
         """The scorer of rules."""
         return Scorer(self.experience)
 
-    def record(self, rule: Rule) -> Tally:
+    def record(self, rule: LearnedRule) -> Tally:
         """Return how often rules achieved goals of the rule's kind, and how often rules failed for goals of this kind."""
         return self.totals.get(rule.goals.name, {}).get(ITSELF, Tally())
 
-    def helps(self, rule: Rule) -> bool:
+    def helps(self, rule: LearnedRule) -> bool:
         """Return whether rules have achieved goals of the rule's kind at least as often as rules have failed."""
         return self.record(rule).chosen >= max(1, self.record(rule).failed)
 
-    def harms(self, rule: Rule) -> bool:
+    def harms(self, rule: LearnedRule) -> bool:
         """Return whether rules have failed for goals of the rule's kind more often than rules have succeeded."""
         return self.record(rule).chosen < self.record(rule).failed
 
@@ -91,7 +91,11 @@ class Memory:
         )
 
     def policy(
-        self, call: Call, mode: str = "leading", joins: dict[str, Bind | None] | None = None, also: Iterable[Rule] = ()
+        self,
+        call: Call,
+        mode: str = "leading",
+        joins: dict[str, Bind | None] | None = None,
+        also: Iterable[LearnedRule] = (),
     ) -> RulePolicy:
         """Return the rules for a call, with scores of rules and of the individuals in their roles.
 
@@ -150,7 +154,7 @@ class Memory:
 
 def plan(
     problem: Problem,
-    memory: Memory | None = None,
+    memory: Advisor | None = None,
     mode: str = "guarded",
     limits: Limits = Limits(),  # noqa: B008 - frozen
     using: Compiled | None = None,

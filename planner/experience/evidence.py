@@ -20,7 +20,7 @@ from typing import TypeAlias
 from confab.planner.hierarchical.operators import Program
 from confab.planner.transitions import Cell, Table
 from confab.reasoner.language import walk
-from confab.reasoner.memory.experience import ITSELF, Experience, Fact, Method, Rule, Tally
+from confab.reasoner.memory.experience import ITSELF, Experience, Fact, LearnedRule, Method, Tally
 from confab.reasoner.symbols import FALSE, ClassCondition, Problem, Witness
 
 DECAY = 0.9
@@ -45,7 +45,7 @@ class FactReader:
             self.wanters.setdefault((cell[0], value), []).append(cell)
         self._plans: dict[tuple[str, bool], list[tuple[int, str, Answer]]] = {}
 
-    def facts(self, rule: Rule, roles: tuple[str, ...], among: Container[str] | None = None) -> list[Fact]:
+    def facts(self, rule: LearnedRule, roles: tuple[str, ...], among: Container[str] | None = None) -> list[Fact]:
         """Return the facts about the individuals in a rule's roles, optionally only the facts for given questions."""
         plan = self._plans.get((rule.name, among is None))
         if plan is None:
@@ -54,7 +54,7 @@ class FactReader:
         named = {individual: role for (role, _), individual in zip(rule.kinds, roles, strict=True)}
         return [(asks, answer(roles[i], named)) for i, asks, answer in plan]
 
-    def individuals(self, rule: Rule, roles: tuple[str, ...]) -> list[Fact]:
+    def individuals(self, rule: LearnedRule, roles: tuple[str, ...]) -> list[Fact]:
         """Return the individual in each role of a rule, for the roles whose class has few members."""
         members = self.problem.members
         return [
@@ -63,7 +63,7 @@ class FactReader:
             if 1 < len(members(kind)) <= CROWD
         ]
 
-    def _questions(self, rule: Rule) -> Iterator[tuple[int, str, Answer]]:
+    def _questions(self, rule: LearnedRule) -> Iterator[tuple[int, str, Answer]]:
         members, situations = self.problem.members, self.problem.domain.situations.values()
         for i, (role, kind) in enumerate(rule.kinds):
             here, name = members(kind), role[1:]
@@ -145,7 +145,7 @@ class Scorer:
         self._weights: dict[str, dict[Fact, float]] = {}
         self._asked: dict[str, frozenset[str]] = {}
 
-    def weights(self, rule: Rule | Method) -> Mapping[Fact, float]:
+    def weights(self, rule: LearnedRule | Method) -> Mapping[Fact, float]:
         """Return the contribution of each counted fact to the cogency of a rule, in ln odds.
 
         The contribution of the rule itself is always included.
@@ -166,7 +166,9 @@ class Scorer:
                     found[fact] = log(chosen / passed)
         return found
 
-    def factors(self, rule: Rule | Method, facts: Iterable[Fact], individuals: Iterable[Fact] = ()) -> Iterator[Factor]:
+    def factors(
+        self, rule: LearnedRule | Method, facts: Iterable[Fact], individuals: Iterable[Fact] = ()
+    ) -> Iterator[Factor]:
         """Yield the contributions to the cogency of following a rule in a situation with the given facts."""
         weights, liked = self.weights(rule), self.preferred.get(rule.name, {})
         for fact in (ITSELF, *facts):
@@ -177,11 +179,11 @@ class Scorer:
             if c or p:
                 yield Factor(fact, log((c + 0.5) / (p + 0.5)))
 
-    def cogency(self, rule: Rule | Method, facts: Iterable[Fact], individuals: Iterable[Fact]) -> float:
+    def cogency(self, rule: LearnedRule | Method, facts: Iterable[Fact], individuals: Iterable[Fact]) -> float:
         """Return the sum of the contributions to the cogency."""
         return sum(factor.weight for factor in self.factors(rule, facts, individuals))
 
-    def score(self, reader: FactReader, rule: Rule, roles: tuple[str, ...]) -> float:
+    def score(self, reader: FactReader, rule: LearnedRule, roles: tuple[str, ...]) -> float:
         """Return the cogency of following a rule with individuals in its roles, according to the counted facts."""
         weights = self.weights(rule)
         if rule.name not in self._asked:

@@ -24,7 +24,7 @@ from confab.planner.hierarchical.refinement import RefinedStep
 from confab.planner.hierarchical.workspace import EXPANSION, Keep
 from confab.planner.transitions import Cell, arguments_of
 from confab.reasoner.amounts import meets, number
-from confab.reasoner.memory.experience import ITSELF, Experience, Order, Rule, Tally
+from confab.reasoner.memory.experience import ITSELF, Experience, LearnedRule, Order, Tally
 from confab.reasoner.symbols import FALSE, TRUE, Condition, Fact, Symbol, ValueCondition, Witness
 
 STEPS_PER_COST = 3
@@ -59,7 +59,7 @@ class RulePolicy:
     def __init__(
         self,
         call: Call,
-        rules: Iterable[Rule],
+        rules: Iterable[LearnedRule],
         orders: Sequence[Order] = (),
         score: Score | None = None,
         joins: dict[str, Bind | None] | None = None,
@@ -418,10 +418,10 @@ def by_rules(policy: RulePolicy) -> None:
                     progress = True
 
 
-def rules_in(experience: Experience) -> list[Rule]:
+def rules_in(experience: Experience) -> list[LearnedRule]:
     """Return the rules of an experience that aren't disabled."""
     said = sorted(experience.said.items())
-    return [one for name, one in said if isinstance(one, Rule) and name not in experience.disabled]
+    return [one for name, one in said if isinstance(one, LearnedRule) and name not in experience.disabled]
 
 
 def usable(experience: Experience) -> list[Order]:

@@ -19,7 +19,7 @@ from confab.planner.hierarchical.operators import FEW, Achiever
 from confab.planner.hierarchical.symmetry import representatives
 from confab.planner.transitions import Cell, arguments_of, key_of
 from confab.reasoner.amounts import meets, towards
-from confab.reasoner.memory.experience import Ground, Rule
+from confab.reasoner.memory.experience import Ground, LearnedRule
 from confab.reasoner.symbols import FALSE, TRUE, ValueCondition
 
 COMPARED, TRIES = 40, 3
@@ -38,7 +38,7 @@ Query: TypeAlias = "tuple[int, Goal, bool]"
 class RuleInstance(NamedTuple):
     """A rule with the symbol of a goal, an individual for each role, and the positions of the unmet conditions."""
 
-    rule: Rule
+    rule: LearnedRule
     goal: Cell
     roles: Roles
     unmet: tuple[int, ...] = ()
@@ -84,14 +84,14 @@ class Instances:
     def __init__(
         self,
         call: Call,
-        rules: Iterable[Rule],
+        rules: Iterable[LearnedRule],
         allowance: Allowance,
         score: Score | None = None,
         joins: dict[str, Bind | None] | None = None,
     ) -> None:
         self.call, self.allowance, self.score = call, allowance, score
         self.joins: dict[str, Bind | None] = {} if joins is None else joins
-        self.rules: dict[tuple[int, str], list[Rule]] = {}
+        self.rules: dict[tuple[int, str], list[LearnedRule]] = {}
         for rule in rules:
             if known(rule, call.program.problem):
                 level = call.program.domain.behaviors[rule.does[0]].level
@@ -138,7 +138,7 @@ class Instances:
         return self.found[query]
 
     def fillings(
-        self, rule: Rule, cell: Cell, value: str, suggested_or_not: bool
+        self, rule: LearnedRule, cell: Cell, value: str, suggested_or_not: bool
     ) -> Iterator[tuple[Roles, tuple[int, ...]]]:
         """Return individuals for the roles of a rule, with the positions of the rule's unmet conditions.
 

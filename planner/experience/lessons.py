@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
-from confab.planner.experience.advice import Memory
+from confab.planner.experience.advice import Advisor
 from confab.planner.experience.evidence import FactReader, fillers
 from confab.planner.experience.following import by_rules, rules_in
 from confab.planner.experience.instances import RuleInstance
@@ -30,10 +30,10 @@ from confab.reasoner.memory.experience import (
     Fact,
     GoalKind,
     Ground,
+    LearnedRule,
     LearningError,
     Lesson,
     Method,
-    Rule,
     Tally,
 )
 from confab.reasoner.symbols import Problem, Symbol
@@ -68,7 +68,7 @@ def teach(experience: Experience, problem: Problem, plan: Plan | None = None) ->
         found = fast.plan(variant, limits=SHORT, using=using, improve=0).plan
         if found is not None:
             lesson += rules_and_methods(variant, found, using)
-    rules = [one for one in lesson.said if isinstance(one, Rule)]
+    rules = [one for one in lesson.said if isinstance(one, LearnedRule)]
     lesson += learned(experience, problem, plan, using, rules=rules)
     lesson.personal.clear()  # the planner's own choices aren't counted as preferences
     experience.learn(with_first_record(experience, lesson, problem, using))
@@ -172,7 +172,7 @@ def with_first_record(experience: Experience, lesson: Lesson, problem: Problem, 
 
 def record(experience: Experience, problem: Problem, using: Compiled) -> Lesson:
     """Return the record of the known rules on a problem: the goals that the rules achieve without search."""
-    memory = Memory(experience)
+    memory = Advisor(experience)
     call = Call(problem, memory.warmed(using), None, SHORT.expansions)
     policy = memory.policy(call)
     lesson, open_ = Lesson(), policy.open()
@@ -201,7 +201,7 @@ def learned(
     plan: Plan,
     using: Compiled,
     failed: tuple[int, ...] | None = None,
-    rules: Sequence[Rule] = (),
+    rules: Sequence[LearnedRule] = (),
 ) -> Lesson:
     """Return the lesson of a plan: rules, orders, methods, chosen individuals, and individuals passed over."""
     steps = list(plan.steps)
@@ -209,7 +209,7 @@ def learned(
     if at is not None:
         return lesson_of_failure(experience, problem, steps[at], (failed or ())[1:], using, steps[:at])
     lesson = rules_and_methods(problem, plan, using)
-    own = [rule for rule in lesson.said if isinstance(rule, Rule)]
+    own = [rule for rule in lesson.said if isinstance(rule, LearnedRule)]
     lesson += chosen([*rules, *own], experience, problem, steps, using)
     return lesson
 
@@ -313,14 +313,14 @@ def method_of(methods: Methods, step: Step, own: tuple[str, ...]) -> tuple[Metho
 
 
 def chosen(
-    rules: Iterable[Rule], experience: Experience, problem: Problem, steps: Sequence[Step], using: Compiled
+    rules: Iterable[LearnedRule], experience: Experience, problem: Problem, steps: Sequence[Step], using: Compiled
 ) -> Lesson:
     """Return the chosen and the passed-over rule instances of a plan, among instances of known and given rules.
 
     If steps are refined together, the changes that each step states are applied before the choice of the next step.
     """
     call = Call(problem, using, None, SHORT.expansions)
-    policy = Memory(experience).policy(call, also=rules)
+    policy = Advisor(experience).policy(call, also=rules)
     reader = FactReader(using.program, call.table, call.goal)
     lesson = Lesson()
     later = grounds(steps)
@@ -345,7 +345,7 @@ def chosen(
     return lesson
 
 
-def counts_of(reader: FactReader, c: RuleInstance, tally: Tally) -> Iterator[tuple[Rule, Fact, Tally]]:
+def counts_of(reader: FactReader, c: RuleInstance, tally: Tally) -> Iterator[tuple[LearnedRule, Fact, Tally]]:
     """Yield a tally for the rule of an instance, and for each fact about the individuals in the rule's roles."""
     return ((c.rule, fact, tally) for fact in (ITSELF, *reader.facts(c.rule, c.roles)))
 
@@ -386,7 +386,7 @@ def lesson_of_failure(
     may have caused the failure.
     """
     call = Call(problem, using, None, SHORT.expansions)
-    policy = Memory(experience).policy(call)
+    policy = Advisor(experience).policy(call)
     for earlier in before:
         carry_out(call, earlier)
     reader = FactReader(using.program, call.table, call.goal)

@@ -14,7 +14,7 @@ from typing import TypeAlias
 from confab.planner.generated import identifier, tuple_written, written
 from confab.planner.transitions import PythonWriter, Table
 from confab.reasoner.language import is_variable, mentions, walk
-from confab.reasoner.memory.experience import Rule
+from confab.reasoner.memory.experience import LearnedRule
 from confab.reasoner.symbols import Comparison, Condition, Problem, RelationCondition, ValueCondition, substituted
 
 Find: TypeAlias = "Callable[..., Iterator[tuple[tuple[str, ...], tuple[int, ...]]]]"
@@ -34,7 +34,7 @@ DEEPEST = 18
 """Maximum number of nested loops in a generated function; Python allows slightly more."""
 
 
-def soft(rule: Rule, problem: Problem) -> tuple[Condition, ...]:
+def soft(rule: LearnedRule, problem: Problem) -> tuple[Condition, ...]:
     """Return the conditions that steps can achieve: conditions of a rule on the state, and comparisons of its behaviour."""
     behavior = problem.domain.behaviors[rule.does[0]]
     put = {p.name: term for p, term in zip(behavior.parameters, rule.does[1], strict=True)}
@@ -42,7 +42,7 @@ def soft(rule: Rule, problem: Problem) -> tuple[Condition, ...]:
     return (*(c for c in rule.asks if not _static(c)), *(substituted(c, put) for c in compared))
 
 
-def finder(rule: Rule, writer: PythonWriter, asks: Sequence[Condition]) -> Bind | None:
+def finder(rule: LearnedRule, writer: PythonWriter, asks: Sequence[Condition]) -> Bind | None:
     """Return the function that binds a compiled rule to a table of current values, or None if the rule has too many roles.
 
     The problem must have the rule's behaviour, classes and situation types (`known`).
@@ -54,7 +54,7 @@ def finder(rule: Rule, writer: PythonWriter, asks: Sequence[Condition]) -> Bind 
     return lambda table, pick: bind(table.now, table.holders, pick)
 
 
-def known(rule: Rule, problem: Problem) -> bool:
+def known(rule: LearnedRule, problem: Problem) -> bool:
     """Return whether a problem has the behaviour, all classes and all situation types of a rule."""
     domain, classes = problem.domain, problem.classes
     behavior = domain.behaviors.get(rule.does[0])
@@ -85,7 +85,7 @@ def _variables(terms: Iterable[str]) -> set[str]:
 class _Join:
     """Writer of the Python function that yields the instances of one rule."""
 
-    def __init__(self, rule: Rule, writer: PythonWriter, asks: Sequence[Condition]) -> None:
+    def __init__(self, rule: LearnedRule, writer: PythonWriter, asks: Sequence[Condition]) -> None:
         self.rule, self.writer, self.soft = rule, writer, asks
         self.kinds, self.problem = dict(rule.kinds), writer.problem
         self.hard = [c for c in rule.asks if c not in asks]

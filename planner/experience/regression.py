@@ -24,7 +24,7 @@ from confab.reasoner.amounts import Amount, inside, meets, towards
 from confab.reasoner.derivation import strata
 from confab.reasoner.language import terms, walk
 from confab.reasoner.limits import check
-from confab.reasoner.memory.experience import Ground, LearningError, Order, Rule
+from confab.reasoner.memory.experience import Ground, LearnedRule, LearningError, Order
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -158,7 +158,7 @@ class PlanTrace:
 
     # -------------------------------------------------------------------------------------------------------- regressing
 
-    def rules_of(self) -> Iterator[Rule]:
+    def rules_of(self) -> Iterator[LearnedRule]:
         """Yield a rule for each change of a step that a goal or a later step needs.
 
         After the last rule, the facts of the trace are those of the initial state.
@@ -231,7 +231,7 @@ class PlanTrace:
                 need.update(dict.fromkeys(self.before(c, done)))
         return need, achieved
 
-    def links(self, done: Done, achieved: Iterable[Condition], facts: Facts, later: Facts) -> Iterator[Rule]:
+    def links(self, done: Done, achieved: Iterable[Condition], facts: Facts, later: Facts) -> Iterator[LearnedRule]:
         """Yield the rule for each needed change of a step; the change is the rule's goal."""
         goals: dict[ValueCondition, None] = {}
         for c in achieved:
@@ -288,7 +288,7 @@ class PlanTrace:
 
     def lifted(
         self, goal: ValueCondition, need: Sequence[Condition], step: Ground, order: Sequence[str]
-    ) -> Rule | None:
+    ) -> LearnedRule | None:
         """Return a rule in which individuals are replaced by roles and implied conditions are removed.
 
         Return None if memory files can't express a condition.
@@ -340,7 +340,7 @@ class PlanTrace:
                     continue
             asks[ordered_inside(substituted(c, roles))] = None
         own = {term: roles.get(term, term) for term in (*goal.arguments, goal.value, *step[1])}
-        return Rule(
+        return LearnedRule(
             ValueCondition(goal.situation, tuple(own[a] for a in goal.arguments), own[goal.value]),
             tuple(sorted(asks, key=repr)),
             (step[0], tuple(own[a] for a in step[1])),

@@ -48,7 +48,7 @@ def _named(kind: str, said: object) -> str:
 
 
 @dataclass(frozen=True)
-class Rule:
+class LearnedRule:
     """A behaviour that achieves a goal, with roles as arguments; different roles denote different individuals.
 
     Attributes
@@ -155,7 +155,7 @@ class GoalKind:
         return _named("goals", (self.situation, self.classes))
 
 
-Said: TypeAlias = "Rule | Order | Method | GoalKind"
+Said: TypeAlias = "LearnedRule | Order | Method | GoalKind"
 
 
 @dataclass(frozen=True)

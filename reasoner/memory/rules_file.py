@@ -15,7 +15,7 @@ from urllib.parse import quote, unquote
 import pyoxigraph as ox
 
 from confab.reasoner.condition_nodes import Node, NodeReader, NodeWriter
-from confab.reasoner.memory.experience import GoalKind, Method, OpenRole, Order, Rule, Said
+from confab.reasoner.memory.experience import GoalKind, LearnedRule, Method, OpenRole, Order, Said
 from confab.reasoner.names import Names
 from confab.reasoner.symbols import FALSE, TRUE, Condition, ValueCondition
 from confab.reasoner.vocabulary import ARGUMENTS, CORE, MEMORY, RDF
@@ -27,7 +27,7 @@ T = TypeVar("T")
 def label(one: Said) -> str:
     """Return a short description of a learned item."""
     match one:
-        case Rule(goal, _, does):
+        case LearnedRule(goal, _, does):
             wanted = " ".join((*goal.arguments[:1], goal.situation, *goal.arguments[1:], goal.value))
             return f"for {wanted}: {' '.join((does[0], *does[1]))}".replace("?", "")
         case Order(first, then, shared):
@@ -55,7 +55,7 @@ class RuleWriter:
         """Return the Turtle statements of a learned item and its parts."""
         me = f"m:{one.name}"
         match one:
-            case Rule():
+            case LearnedRule():
                 kind, lines = "LearnedRule", self.rule(one, me)
             case Order(first, then, shared):
                 pairs = "".join(f' ; :shares "{i} {j}"' for i, j in shared)
@@ -69,7 +69,7 @@ class RuleWriter:
         head = f"{me} a owl:NamedIndividual, :{kind} ; rdfs:label {ox.Literal(self.words(one))}{off} ; {lines[0]} .\n"
         return head + "".join(f"{line} .\n" for line in lines[1:])
 
-    def rule(self, rule: Rule, me: str) -> list[str]:
+    def rule(self, rule: LearnedRule, me: str) -> list[str]:
         """Return texts: first the properties of a rule, then the statements of the rule's parts."""
         terms = {role: f"{me}.{quote(role[1:], safe='')}" for role, _ in rule.kinds}
         nodes = _RuleNodes(me, self.term, terms)
@@ -175,7 +175,7 @@ class RuleReader(NodeReader):
             return GoalKind(self.short(self.one(iri, "situationType")), self.arguments(iri))
         return None
 
-    def rule(self, iri: str, node: Node) -> Rule:
+    def rule(self, iri: str, node: Node) -> LearnedRule:
         """Return the rule of a node."""
         roles = sorted(node.get("role", ()), key=lambda role: (int(self.one(role, "index")), role))
         terms = {role: "?" + unquote(role.removeprefix(iri + ".")) for role in roles}
@@ -188,7 +188,7 @@ class RuleReader(NodeReader):
         asks = self.in_order(map(self.condition, node.get("asksFor", ())))
         does = self.short(self.one(iri, "does")), self.arguments(iri)
         kinds = tuple((terms[role], self.short(self.one(role, "termType"))) for role in roles)
-        return Rule(goal, asks, does, kinds)
+        return LearnedRule(goal, asks, does, kinds)
 
     def arguments_of(self, iri: str) -> list[str]:
         """Return the IRIs of a node's arguments, in order."""

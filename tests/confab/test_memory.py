@@ -16,7 +16,7 @@ from confab.planner.acting.episode import Failure
 from confab.planner.plan import Plan
 from confab.reasoner.generate import write_scene
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.memory.experience import ITSELF, Experience, GoalKind, Lesson, Method, Rule, Tally
+from confab.reasoner.memory.experience import ITSELF, Experience, GoalKind, LearnedRule, Lesson, Method, Tally
 from confab.reasoner.memory.links import Links
 from confab.reasoner.memory.links_file import memory_lines
 
@@ -91,7 +91,7 @@ def test_teaching_gives_rules_and_methods_of_every_level(scene: confab.Scene) ->
     memory, plan = confab.Memory.of(scene), scene.plan().plan
     memory.teach(scene, plan)
     said = memory.experience.said.values()
-    done = {scene.problem.domain.behaviors[one.does[0]].level for one in said if isinstance(one, Rule)}
+    done = {scene.problem.domain.behaviors[one.does[0]].level for one in said if isinstance(one, LearnedRule)}
     assert done == {1, 2, 3}
     assert {one.behavior[:3] for one in said if isinstance(one, Method)} == {"B1_", "B2_"}
     assert len(memory.links)
@@ -106,7 +106,10 @@ def test_the_page_of_a_memory_is_readable_and_an_edited_rule_changes_the_plan(
     memory.teach(scene, scene.plan().plan)
     memory.save(path)
     assert "move movable to place" in memory.page()
-    led, rules = scene.plan(memory=path), [one for one in memory.experience.said.values() if isinstance(one, Rule)]
+    led, rules = (
+        scene.plan(memory=path),
+        [one for one in memory.experience.said.values() if isinstance(one, LearnedRule)],
+    )
     move = next(rule for rule in rules if rule.does[0] == "B1_MOVE")
     text = path.read_text()
     assert f"m:{move.name} a owl:NamedIndividual, :LearnedRule ;" in text
@@ -162,7 +165,9 @@ def test_rules_of_a_step_that_failed_in_execution_are_counted_as_failed(scene: c
     failure = Failure(episode.planned.primitives[0], "slipped", (), "it slipped", episode.initial)
     memory.live(scene.problem, replace(episode, failures=(failure,), done=Plan(())))
     failed = {name for name, facts in memory.experience.totals().items() for t in facts.values() if t.failed}
-    did = {one.does[0] for name, one in memory.experience.said.items() if name in failed and isinstance(one, Rule)}
+    did = {
+        one.does[0] for name, one in memory.experience.said.items() if name in failed and isinstance(one, LearnedRule)
+    }
     assert did == {episode.planned.steps[0].behavior}
 
 

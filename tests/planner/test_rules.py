@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import confab
-from confab.planner.experience.advice import Memory, plan
+from confab.planner.experience.advice import Advisor, plan
 from confab.planner.experience.allowance import FREE
 from confab.planner.experience.evidence import FactReader
 from confab.planner.experience.following import RulePolicy, rules_in
@@ -86,20 +86,20 @@ def expanded(outcome: Outcome, level: int = 1) -> int:
     return sum(counts.expanded for at, counts in outcome.search.items() if at == level)
 
 
-def inverted(memory: Memory) -> Memory:
+def inverted(memory: Advisor) -> Advisor:
     """Return a memory whose rules promise the opposite of their effects, and prefer the alternatives that were passed over."""
     experience = Experience("inverted", {"inverted": 1})
     wrong = [backwards(rule) for rule in rules_in(memory.experience)]
     experience.learn(Lesson(said=list(wrong), counted=[(rule, ITSELF, Tally(passed_over=5)) for rule in wrong]))
-    return Memory(experience)
+    return Advisor(experience)
 
 
-def foreign() -> Memory:
+def foreign() -> Advisor:
     """Return a memory of behaviours that the domain doesn't have."""
     experience = Experience("foreign")
     rules = rules_in(taught().experience)
     experience.learn(Lesson(said=[replace(rule, does=(f"OTHER_{rule.does[0]}", rule.does[1])) for rule in rules]))
-    return Memory(experience)
+    return Advisor(experience)
 
 
 def test_five_rules_learned_from_small_ferries_plan_for_a_hundred_cars_without_search(tmp_path: Path) -> None:
@@ -109,7 +109,7 @@ def test_five_rules_learned_from_small_ferries_plan_for_a_hundred_cars_without_s
     # These rules have the goals to be at a place, not to be at a place, and to be empty.
     assert sorted(rule.does[0] for rule in rules_in(experience)) == ["BOARD", "LEAVE", "LEAVE", "SAIL", "SAIL"]
     large = ferry(tmp_path, 100, 30)
-    outcome = plan(large, Memory(experience), improve=0)
+    outcome = plan(large, Advisor(experience), improve=0)
     assert outcome.plan is not None
     assert validate(large, outcome.plan) == []
     assert expanded(outcome) == len(outcome.plan.steps)
@@ -120,7 +120,7 @@ def test_objects_that_several_goals_need_are_gathered_first_on_a_one_way_path(tm
     for places, seats in ((4, 1), (5, 2), (6, 3)):
         teach(experience, walk(tmp_path, places, seats))
     large = walk(tmp_path, 14, 10)
-    found = plan(large, Memory(experience))
+    found = plan(large, Advisor(experience))
     assert found.plan is not None and not validate(large, found.plan)
     assert len(found.plan.steps) == 13 + 10 + 10  # each place, coin and seat once
     assert expanded(found) <= 2 * len(found.plan.steps)  # one promise is broken, then all promises are kept
@@ -148,7 +148,7 @@ def test_in_strict_mode_expansions_never_exceed_the_memoryless_ones_by_more_than
     assert expanded(with_memory) <= 1.05 * expanded(alone)
 
 
-def spoiled(memory: Memory, seed: int) -> Memory:
+def spoiled(memory: Advisor, seed: int) -> Advisor:
     """Return a memory whose rules were changed at random and have no record."""
     dice, experience = random.Random(seed), Experience("spoiled")
     rules = rules_in(memory.experience)
@@ -157,7 +157,7 @@ def spoiled(memory: Memory, seed: int) -> Memory:
         arguments = tuple(dice.sample(given, len(given)))
         asks = tuple(c for c in rule.asks if dice.random() < 0.7)
         experience.learn(Lesson(said=[replace(rule, does=(name, arguments), asks=asks)]))
-    return Memory(experience)
+    return Advisor(experience)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -191,13 +191,13 @@ def test_rules_are_not_followed_for_goals_of_which_they_reached_less_than_half()
     kinds = {rule.goals for rule in memory.rules}
     poor.learn(Lesson(counted=[(kind, ITSELF, Tally(failed=1000)) for kind in kinds]))
     call = Call(within, compiled(within), None, 1000)
-    followed = Memory(poor).policy(call, "guarded").instances.rules
+    followed = Advisor(poor).policy(call, "guarded").instances.rules
     assert {level for level, _ in followed} == {2, 3}  # the record counts goals of a task, not of refinements
-    assert Memory(poor).policy(call, "leading").instances.rules == memory.policy(call, "guarded").instances.rules != {}
+    assert Advisor(poor).policy(call, "leading").instances.rules == memory.policy(call, "guarded").instances.rules != {}
 
 
 def test_untrusted_memory_runs_in_strict_mode_by_itself() -> None:
-    within, untrusted = problem("swap", 8), Memory(taught().experience, trusted=False)
+    within, untrusted = problem("swap", 8), Advisor(taught().experience, trusted=False)
     assert expanded(plan(within, untrusted, "leading")) == expanded(plan(within, taught(), "strict"))
 
 
@@ -252,9 +252,9 @@ def test_a_preference_that_flips_after_forty_episodes_is_relearned_within_ten() 
     other = Plan(tuple(map(by_the_other_hand, one.steps)))
     for _ in range(40):
         live(experience, within, other)
-    assert hands(plan(within, Memory(experience)).plan) == {"hand2"}
+    assert hands(plan(within, Advisor(experience)).plan) == {"hand2"}
     episodes = 0
-    while hands(plan(within, Memory(experience)).plan) != {"hand1"}:
+    while hands(plan(within, Advisor(experience)).plan) != {"hand1"}:
         live(experience, within, one)
         episodes += 1
     assert episodes <= 10
@@ -268,7 +268,7 @@ def test_a_hand_that_failed_at_a_place_is_avoided_there_and_the_method_gets_no_f
     put = next(step for step in top.walk() if step.behavior == "B3_REACH_HAND_LOCATION")
     live(experience, within, Plan(()), failures=[(within, top, put.path)])
     hand, place = put.arguments
-    again = plan(within, Memory(experience)).plan
+    again = plan(within, Advisor(experience)).plan
     assert again is not None and validate(within, again) == []
     assert all({hand, place} - set(step.arguments) for step in again.primitives)
     blamed = [experience.said[name] for name, its in experience.totals().items() if its.get(ITSELF, Tally()).failed]
@@ -285,9 +285,9 @@ def test_a_failed_rule_becomes_less_cogent_and_a_chosen_rule_is_counted() -> Non
     assert (one.rule, ITSELF, Tally(chosen=1)) in lesson.counted
     experience = Experience("robot")
     experience.learn(lesson)
-    before = Memory(experience).scorer.cogency(one.rule, [], [])
+    before = Advisor(experience).scorer.cogency(one.rule, [], [])
     experience.learn(Lesson(counted=[(one.rule, ITSELF, Tally(failed=3))]))
-    assert Memory(experience).scorer.cogency(one.rule, [], []) < before
+    assert Advisor(experience).scorer.cogency(one.rule, [], []) < before
 
 
 def jugs(cups: int, stuck: int) -> Problem:
@@ -313,7 +313,7 @@ def test_a_step_without_refinement_is_not_tried_again_after_a_lesson_or_an_episo
     alone = fast.plan(within)
     teach(experience, jugs(2, 2))
     for _ in range(2):
-        led = plan(within, Memory(experience))
+        led = plan(within, Advisor(experience))
         assert led.plan is not None and alone.plan is not None
         assert led.plan.length == alone.plan.length
         assert (expanded(led), led.misses) == (10, 0) < (expanded(alone), alone.misses)
@@ -351,7 +351,7 @@ def test_rules_act_on_the_level_of_their_behaviours_even_if_a_plan_leaves_a_leve
         for (level, _), rules in policy.instances.rules.items()
         for rule in rules
     )
-    alone, led = fast.plan(within), plan(within, Memory(experience))
+    alone, led = fast.plan(within), plan(within, Advisor(experience))
     assert led.plan is not None
     assert validate(within, led.plan) == []
     assert len(led.given_up) <= len(alone.given_up)
@@ -370,13 +370,13 @@ def test_rules_are_followed_in_refinements_with_most_of_the_search_effort() -> N
     experience = Experience("robot")
     teach(experience, small)
     few = replace(large, goal=dict(list(large.goal.items())[:3]))
-    alone, led = fast.plan(few, improve=0), plan(few, Memory(experience), improve=0)
+    alone, led = fast.plan(few, improve=0), plan(few, Advisor(experience), improve=0)
     assert led.plan is not None
     assert validate(few, led.plan) == []
     assert led.misses < alone.misses
     assert expanded(led, 2) <= led.plan.length[2]
     live(experience, few, led.plan)
-    again = plan(few, Memory(experience), improve=0)
+    again = plan(few, Advisor(experience), improve=0)
     assert expanded(again, 2) <= 1.1 * again.plan.length[2] if again.plan else False
 
 
@@ -385,7 +385,7 @@ def test_one_lesson_in_a_small_world_suffices_for_a_large_world(world: str) -> N
     small, large = (confab.load(f"{world}-{size}").problem for size in ("small", "large"))
     experience = Experience("robot")
     teach(experience, small)
-    led = plan(large, Memory(experience), improve=0)
+    led = plan(large, Advisor(experience), improve=0)
     assert led.plan is not None
     assert validate(large, led.plan) == []
     assert expanded(led) <= 1.1 * led.plan.length[1]
@@ -435,7 +435,7 @@ def test_rules_are_learned_in_a_domain_with_comparisons_of_amounts() -> None:
     small, large = (confab.load(f"canteen-{size}").problem for size in ("small", "large"))
     experience = Experience("robot")
     teach(experience, small)
-    alone, led = fast.plan(large, improve=0), plan(large, Memory(experience), improve=0)
+    alone, led = fast.plan(large, improve=0), plan(large, Advisor(experience), improve=0)
     assert led.plan is not None
     assert validate(large, led.plan) == []
     assert 3 * expanded(led) < 2 * expanded(alone)
@@ -451,7 +451,7 @@ def test_goals_that_rules_have_reached_before_are_planned_without_a_search_for_a
     experience = Experience("robot")
     teach(experience, small)
     monkeypatch.setattr(agenda, "proved", proved)
-    assert plan(large, Memory(experience)).plan is not None
+    assert plan(large, Advisor(experience)).plan is not None
     with pytest.raises(AssertionError, match="looked for a proof"):
         fast.plan(large, improve=0)  # its goals are achieved in series
 
@@ -548,7 +548,7 @@ def test_a_goal_that_no_object_violates_a_condition_is_achieved_by_rules_one_obj
     experience = Experience("robot")
     teach(experience, dairy(tmp_path, 1, 2))
     large = dairy(tmp_path, 3, 5)
-    outcome = plan(large, Memory(experience), improve=0)
+    outcome = plan(large, Advisor(experience), improve=0)
     assert outcome.plan is not None
     assert validate(large, outcome.plan) == []
     assert expanded(outcome) == len(outcome.plan.steps)
@@ -609,7 +609,7 @@ def test_an_assigned_object_that_becomes_unsuitable_is_replaced_by_a_suitable_on
     for crates, places in ((1, 3), (2, 4), (3, 4)):
         teach(experience, lorries(tmp_path, 1, crates, places))
     large = lorries(tmp_path, 3, 40, 12)
-    outcome = plan(large, Memory(experience), improve=0)
+    outcome = plan(large, Advisor(experience), improve=0)
     assert outcome.plan is not None
     assert validate(large, outcome.plan) == []
     assert expanded(outcome) == len(
@@ -641,7 +641,7 @@ def test_an_instance_of_a_rule_is_not_replaced_by_an_unreachable_one_with_fewer_
     experience = Experience("robot")
     teach(experience, dairy(tmp_path, 1, 2, 2, stays))
     large = dairy(tmp_path, 2, 4, 8, stays)
-    outcome = plan(large, Memory(experience), improve=0)
+    outcome = plan(large, Advisor(experience), improve=0)
     assert outcome.plan is not None
     assert expanded(outcome) == len(outcome.plan.steps)  # one condition is unmet for salted cheese: that it is unsalted
 
@@ -653,7 +653,7 @@ def test_each_object_of_a_condition_on_all_objects_gets_its_own_steps(tmp_path: 
     experience = Experience("robot")
     teach(experience, dairy(tmp_path, 1, 2, domain=shipped))
     large = dairy(tmp_path, 2, 9, domain=shipped)
-    outcome = plan(large, Memory(experience), improve=0)
+    outcome = plan(large, Advisor(experience), improve=0)
     assert outcome.plan is not None
     assert expanded(outcome) == len(outcome.plan.steps)
 

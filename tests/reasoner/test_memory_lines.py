@@ -10,7 +10,17 @@ import pytest
 
 from confab.reasoner.condition_nodes import DEEPEST
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.memory.experience import ITSELF, Experience, GoalKind, Lesson, Method, OpenRole, Order, Rule, Tally
+from confab.reasoner.memory.experience import (
+    ITSELF,
+    Experience,
+    GoalKind,
+    LearnedRule,
+    Lesson,
+    Method,
+    OpenRole,
+    Order,
+    Tally,
+)
 from confab.reasoner.memory.experience_file import MOST, lines, load, parse, probability, save, turtle
 from confab.reasoner.memory.rules_file import RuleReader, label
 from confab.reasoner.names import Names
@@ -23,11 +33,11 @@ GOAL = ValueCondition("AT", ("?cup", "?day"), "?place")
 KINDS = (("?cup", "Cup"), ("?place", "Place"), ("?day", "Day"))
 
 
-def rule(*asks: Condition) -> Rule:
-    return Rule(GOAL, asks, ("MOVE", ("?cup", "?place")), KINDS)
+def rule(*asks: Condition) -> LearnedRule:
+    return LearnedRule(GOAL, asks, ("MOVE", ("?cup", "?place")), KINDS)
 
 
-def written(*said: Rule | Method | Order | GoalKind) -> str:
+def written(*said: LearnedRule | Method | Order | GoalKind) -> str:
     experience = Experience("robot")
     experience.learn(Lesson(list(said), [(one, ITSELF, Tally(1)) for one in said]))
     return "".join(turtle(experience, NAMES, DOMAIN))
@@ -37,8 +47,8 @@ def read(text: str, names: Names | None = NAMES) -> Experience:
     return parse(lines(text), "m.ttl", names)
 
 
-def the_rule(text: str) -> Rule:
-    (found,) = (one for one in read(text).said.values() if isinstance(one, Rule))
+def the_rule(text: str) -> LearnedRule:
+    (found,) = (one for one in read(text).said.values() if isinstance(one, LearnedRule))
     return found
 
 
@@ -110,7 +120,7 @@ def test_short_names_are_the_ends_of_iris_if_no_scene_defines_others() -> None:
     assert reader.short("https://x.org/Cup") == "Cup"
     assert RuleReader({}, NAMES).short(f"{DOMAIN}#MOVE") == "MOVE"
     plain = read(written(rule()), None)
-    assert {one.does for one in plain.said.values() if isinstance(one, Rule)} == {("MOVE", ("?cup", "?place"))}
+    assert {one.does for one in plain.said.values() if isinstance(one, LearnedRule)} == {("MOVE", ("?cup", "?place"))}
 
 
 def test_a_method_keeps_its_steps_and_its_open_roles() -> None:

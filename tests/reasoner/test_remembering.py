@@ -19,11 +19,11 @@ from confab.reasoner.memory.experience import (
     ITSELF,
     Experience,
     GoalKind,
+    LearnedRule,
     Lesson,
     Method,
     OpenRole,
     Order,
-    Rule,
     Said,
     Tally,
 )
@@ -36,7 +36,7 @@ DOMAIN = "https://x.org/k"
 
 
 IN, NOBODY = ValueCondition("LOCATION", ("?cup",), "?place"), ValueCondition("LOCATION", ("?anyone",), "?place")
-RULE = Rule(
+RULE = LearnedRule(
     IN,
     (
         AnyOf(((ClassCondition("?cup", "Bottle", True),), (EqualityCondition("?cup", "?place", True), IN)), True),
@@ -96,7 +96,7 @@ def test_an_edited_rule_keeps_its_counts_a_disabled_rule_is_marked_and_a_deleted
     text = path.read_text()
     path.write_text(text.replace(":asksFor", ":enabled false ; :asksFor").replace("k#Bottle", "k#Cup"))
     edited = load(path, NAMES)
-    rule = next(one for one in edited.said.values() if isinstance(one, Rule))
+    rule = next(one for one in edited.said.values() if isinstance(one, LearnedRule))
     assert (ClassCondition("?cup", "Cup", True) in rule.asks, edited.disabled) == (True, {rule.name})
     assert edited.totals()[rule.name] == experience.totals()[RULE.name]
     save(path, edited, NAMES, DOMAIN)
