@@ -20,9 +20,9 @@ given input can't be used; the message states the fault, its position, and the r
 from __future__ import annotations
 
 import sys as _sys
-from typing import TYPE_CHECKING as _TYPE_CHECKING
 
-if _TYPE_CHECKING:
+TYPE_CHECKING = False  # as in `typing`, whose import takes so long that Ctrl-C during it would print a traceback
+if TYPE_CHECKING:
     from confab.authoring import generate, new_domain, validate
     from confab.curve import Curve, practise
     from confab.execution import Execution

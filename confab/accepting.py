@@ -221,6 +221,12 @@ def sparql_of(given: str | Path, graph: KnowledgeGraph | None = None) -> str:
         given = str(given)
     if not isinstance(given, str):
         raise KnowledgeError(f"wanted SPARQL as text, a .rq file or the name of a shipped query; got {given!r}")
+    if not given.strip():
+        raise KnowledgeError("the query is empty; wanted SPARQL text, a .rq file or the name of a shipped query")
+    try:
+        given = given.encode("utf-8", "surrogateescape").decode("utf-8")
+    except UnicodeError as error:
+        raise KnowledgeError(f"the query isn't in UTF-8: {error}") from error
     if any(sign in given for sign in "{}?\n"):
         return given
     path = Path(given)

@@ -706,6 +706,8 @@ OPTIONS = {
 If a key contains several names, the first one that the called function or command accepts is suggested.
 """
 NEEDLESS = {
+    "state the values of a variable in the query: VALUES ?x { :cup1 }": "bindings binding initbindings init_bindings "
+    "substitutions values params parameters variables vars",
     "the same call gives the same result in every process": "seed random_seed random_state rng set_seed",
     "the option -v of a command prints the duration of each stage": "verbose verbosity debug log_level loglevel log "
     "show_progress progress_bar",

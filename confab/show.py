@@ -31,7 +31,10 @@ def page() -> Console:
 
 def show(what: Any) -> None:
     """Print an object that the library rich can show, to stdout; lines are wrapped only in a terminal."""
-    page().print(what, markup=False, highlight=False)
+    console = page()
+    with console.capture() as text:  # rich would end the process with exit code 1 if the reader of a pipe has ended
+        console.print(what, markup=False, highlight=False)
+    sys.stdout.write(text.get())
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,10 @@ import atexit
 import os
 import signal
 import sys
-from contextlib import suppress
-from typing import NoReturn
+
+TYPE_CHECKING = False  # see `confab/__init__.py`
+if TYPE_CHECKING:
+    from typing import NoReturn
 
 
 def main() -> None:
@@ -27,6 +29,8 @@ def main() -> None:
 
 def _leave(code: int) -> NoReturn:
     """Call exit functions, flush the output, and end the process at once."""
+    from contextlib import suppress
+
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the result is complete
     atexit._run_exitfuncs()
     for stream in (sys.stdout, sys.stderr):

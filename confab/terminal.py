@@ -12,6 +12,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from io import TextIOWrapper
 from pathlib import Path
 from threading import Timer, current_thread, main_thread
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -160,7 +161,14 @@ def show_result(what: Any) -> None:
 
 
 def _open_streams() -> None:
-    """Open the null device for each closed standard stream, so that no other file gets its descriptor."""
+    """Open the null device for each closed standard stream, and use UTF-8 in every locale.
+
+    Without the null device, another file would get the descriptor of a closed stream. A file name that isn't UTF-8 is printed as
+    the bytes of the name.
+    """
+    for stream in (sys.stdin, sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(encoding="utf-8", errors="surrogateescape")
     closed = [stream for stream in (0, 1, 2) if not _is_open(stream)]
     for _ in closed:
         os.open(os.devnull, os.O_RDWR)  # the device gets the lowest free file descriptor

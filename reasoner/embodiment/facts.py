@@ -18,6 +18,7 @@ import pyoxigraph as ox
 from confab.reasoner.embodiment.values import Color, Vector
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.names import local_name
+from confab.reasoner.reading.rows import index_of
 from confab.reasoner.vocabulary import CORE, EMBODIMENT, OWL, RDFS
 
 PREFIXES = {
@@ -73,7 +74,7 @@ class BodyFacts:
             attributes[node][snake(local_name(name))] = value
         for node, name, value in rows(store, LINKS):
             links[node][snake(local_name(name))].append(value)
-        indices = {node: int(index) for node, index in rows(store, INDICES)}
+        indices = {node: index_of(node, index) for node, index in rows(store, INDICES)}
         return cls(attributes, links, grouped(rows(store, TYPES)), grouped(rows(store, SUPERS)), indices)
 
     def text(self, node: str, name: str, default: str | None = None) -> str:

@@ -368,6 +368,18 @@ def test_an_invalid_scene_is_refused_in_one_line_by_plan_and_by_validate(
     assert ask("validate", tearoom)[0] == 1
 
 
+@pytest.mark.parametrize("index", ['"one"', "1.5", "1" + "0" * 5000])
+def test_an_index_that_is_no_whole_number_is_refused_where_a_robot_has_a_body(
+    tmp_path: Path, ask: Ask, index: str
+) -> None:
+    scene = tmp_path / "beverage-serving.ttl"
+    scene.write_text(shipped_scenes()["beverage-serving"].read_text())
+    change(scene, "c:index 1 ;", f"c:index {index} ;")
+    code, out, err = ask("plan", scene, "-q")
+    assert (code, out) == (MISUSE, "")
+    assert "wanted a whole number" in err
+
+
 def test_a_goal_about_too_few_individuals_is_refused(tmp_path: Path, ask: Ask) -> None:
     scene = tmp_path / "packing-small.ttl"
     scene.write_text(shipped_scenes()["packing-small"].read_text())

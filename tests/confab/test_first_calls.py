@@ -105,6 +105,10 @@ SAID: dict[str, tuple[Callable[[confab.Scene, confab.Result], object], str]] = {
     "two goals in place": (lambda scene, result: scene.plan(GOAL, "cup1 LOCATION location7"), "goals=["),
     "a timeout": (lambda scene, result: scene.plan(timeout=3), "did you mean 'time_limit'"),  # type: ignore[call-arg]
     "a seed": (lambda scene, result: scene.plan(seed=3), "the same call gives the same result"),  # type: ignore[call-arg]
+    "bindings of a query": (
+        lambda scene, result: scene.query("SELECT ?o { ?o k:location ?l }", initBindings={}),  # type: ignore[call-arg]
+        "VALUES ?x",
+    ),
     "a memory of nothing": (lambda scene, result: confab.Memory(), "use confab.Memory.of"),  # type: ignore[call-arg]
     "a class among objects": (lambda scene, result: scene.objects["Cup"], "problem.classes"),
     "a scene to validate": (lambda scene, result: confab.validate(scene), "names of shipped scenes"),  # type: ignore[arg-type]

@@ -1,6 +1,7 @@
 """The command line in pipes: stdin and stdout, tables with tabs, saved runs, and refusals before any work begins."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -145,3 +146,42 @@ def test_a_closed_output_pipe_has_another_exit_code_than_a_negative_answer() -> 
     assert done.stdout is not None
     done.stdout.close()
     assert done.wait(60) == 141
+
+
+@pytest.mark.parametrize("command", ["plan", "explain"])
+def test_a_plan_into_a_closed_pipe_has_another_exit_code_than_a_negative_answer(command: str) -> None:
+    done = subprocess.Popen([*RUN, command, "towers-small"], stdout=subprocess.PIPE)
+    assert done.stdout is not None
+    done.stdout.close()
+    assert done.wait(60) == 141
+
+
+def test_output_is_utf_8_in_every_locale(tmp_path: Path) -> None:
+    ascii_only = {
+        **os.environ,
+        "PYTHONIOENCODING": "ascii",
+        "LC_ALL": "C",
+        "PYTHONUTF8": "0",
+        "PYTHONCOERCECLOCALE": "0",
+    }
+    for arguments, said in (
+        (["query", "towers-small", 'SELECT ("ä☕" AS ?x) {}', "--json"], "ä☕"),
+        (["plan", "towers-small"], "solved"),
+        (["plan", "beverage-serving"], "└──"),
+    ):
+        done = subprocess.run([*RUN, *arguments], env=ascii_only, capture_output=True, check=False)
+        assert (done.returncode, said in done.stdout.decode("utf-8")) == (0, True), done.stderr
+
+
+def test_a_file_name_that_is_not_utf_8_is_printed_as_its_bytes(tmp_path: Path) -> None:
+    name = os.fsencode(tmp_path) + b"/caf\xe9.json"
+    done = subprocess.run(
+        [*map(os.fsencode, RUN), b"plan", b"towers-small", b"-o", name], capture_output=True, check=False
+    )
+    assert (done.returncode, done.stdout.split(b":")[0]) == (0, name)
+
+
+@pytest.mark.parametrize("query", [b"ASK {} \xff", b"", b" \n"])
+def test_a_query_on_stdin_that_is_empty_or_not_utf_8_is_refused_in_one_line(query: bytes) -> None:
+    code, _, said = piped("query", "towers-small", "-", given=query)
+    assert (code, said.count("\n")) == (2, 1), said
