@@ -6,7 +6,6 @@ import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from importlib.util import find_spec
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, TypeAlias, cast, overload
@@ -16,30 +15,23 @@ from confab.checking import refused
 from confab.formats import ResultJson
 from confab.interchange import outcome_json
 from confab.known import Known
-from confab.plan_options import NO_ENGINE, PlanOptions
-from confab.planner.certified import certified
-from confab.planner.plan import Limits, Outcome, Plan, Reason, Shortening, Status, Step, paused_collection, renumbered
+from confab.plan_call import planned, read_task
+from confab.plan_options import PlanOptions
+from confab.planner.plan import Outcome, Plan, Status, Step, paused_collection, renumbered
 from confab.planner.solve import DEFAULT_MODE, Mode, Request, solve
 from confab.planner.validation import Fault, validate
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.limits import Deadline, LimitError, within
+from confab.reasoner.limits import Deadline, within
 from confab.reasoner.memory.links import Links
 from confab.reasoner.names import RightNames, right_names
 from confab.reasoner.reading.goals import with_goals
-from confab.reasoner.reading.problem import Reading, read
-from confab.reasoner.reading.relevance import recognise
-from confab.reasoner.refining import never_done, without
+from confab.reasoner.reading.problem import Reading
 from confab.reasoner.symbols import Problem
 from confab.timing import (
     Minimise,
-    asks_for_times,
-    concurrent,
     lanes,
-    may_overlap_by_need,
     needs_others_meanwhile,
     schedule_json,
-    scheduled,
-    with_unit_costs,
 )
 
 if TYPE_CHECKING:
@@ -57,15 +49,6 @@ if TYPE_CHECKING:
     from confab.planner.timed.plan import TimedPlan
     from confab.show import PlanTree
     from confab.why import Account, Because, WhyNot
-
-OURS = 0.6
-"""The share of the time limit that Confab's own search may use; the rest is for an engine, or for scheduling the plan.
-"""
-OURS_WORK = 10_000_000
-"""Maximum work of Confab's own search (states times operators) before an engine is tried, if there is no time limit.
-
-The search does this maximum work in about twenty seconds.
-"""
 
 
 def plan(
@@ -149,165 +132,16 @@ def plan_by(scene: Known, goals: list[str], options: PlanOptions) -> Result:
             raise KnowledgeError(
                 f"memory={memory!r} is no memory; wanted a file's name, Memory.load(FILE) or Memory.of(SCENE)"
             )
-        return _plan(scene, goals, memory, options, deadline)
-
-
-def _plan(
-    scene: Known, goals: list[str], memory: Memory | Links | None, options: PlanOptions, deadline: Deadline
-) -> Result:
-    mode, observed, engine = options.strategy, options.observed, options.engine
-    begin, asked = perf_counter(), scene.knowledge.round_trips
-    links = memory if isinstance(memory, Links) else memory.links if memory is not None and mode == "paper" else None
-    advisor = None if memory is None or isinstance(memory, Links) else memory.advisor
-    grounds = None
-    if mode == "paper":
-        from confab.reasoner.reading.quantification import quantify
-
-        seen = _seen(scene.reading, observed)
-        grounds = {level: quantify(scene.knowledge, seen, level) for level in seen.problem.domain.levels}
-    else:
-        seen = _seen(scene.reading, observed) if observed else recognise(scene.knowledge, goals)
-    scene.knowledge.confirm()
-    problem = with_goals(seen.problem, goals) if observed or mode == "paper" else seen.problem
-    quantified = perf_counter() - begin
-    check_goal(scene.iri, problem)
-
-    def whole() -> Problem:
-        if "reading" not in scene.__dict__:
-            scene.reading = read(scene.knowledge, seen.schema)
-            scene.knowledge.confirm()
-        return with_goals(scene.problem, goals)
-
-    faulty = [*never_done(problem)]
-    if faulty and not seen.whole:  # an individual that wasn't read may have the value
-        problem = whole()
-        faulty = [*never_done(problem)]
-
-    def chosen(problem: Problem) -> tuple[Problem, Outcome]:
-        if not problem.weights:
-            return problem, search(problem)
-        from confab.planner.preferences import preferred
-
-        seconds = deadline.left
-
-        def choosing(task: Problem) -> Outcome:
-            if seconds is not None and deadline.left is not None and deadline.left < seconds / 2:
-                raise LimitError("half of the time limit, which is for proofs")
-            return search(task, DEFAULT_MODE if mode == "optimal" else mode, brief=True)
-
-        def proving(task: Problem) -> Outcome:
-            if seconds is not None and deadline.left is not None and deadline.left < seconds / 10:
-                raise LimitError("the time limit")
-            return search(task, share=0.5)
-
-        alike = with_unit_costs(problem) if options.minimise == "steps" else problem
-        if seconds is None and mode != "optimal":
-            task, outcome = preferred(alike, choosing, finish=search)
-        else:
-            task, outcome = preferred(alike, choosing, proving)
-        return replace(problem, goal=task.goal, weights=task.weights), outcome
-
-    def search(problem: Problem, mode: str = mode, share: float = 1.0, brief: bool = False) -> Outcome:
-        deadline.check("reading the problem")
-        if options.by_engine:
-            from confab.engines import plan_by_engine
-
-            return certified(problem, plan_by_engine(problem, engine, options.level, deadline.left))
-        others, seconds = options.leave_levels and engine != NO_ENGINE, deadline.left
-        if seconds is not None:
-            from confab.engines import some_installed
-
-            more = asks_for_times(problem, options.minimise) or (others and some_installed(problem))
-            seconds *= share * (OURS if more else 1.0)
-        shortening: Shortening = "brief" if brief else "once" if seconds is None else "repeated"
-        alike = with_unit_costs(problem) if options.minimise == "steps" else problem
-        request = Request(
-            alike, mode, Limits(seconds=seconds, shortening=shortening), advisor, links, grounds, options.leave_levels
-        )
-        soon = others and seconds is None and mode != "paper" and find_spec("unified_planning") is not None
-        outcome = solve(replace(request, limits=Limits(work=OURS_WORK, shortening=shortening)) if soon else request)
-        if outcome.status is not Status.GAVE_UP or not others or deadline.left == 0:
-            return outcome
-        began = perf_counter() - outcome.seconds
-        theirs = _by_an_engine(problem, deadline)
-        if isinstance(theirs, Outcome):
-            return replace(theirs, seconds=perf_counter() - began)
-        outcome = solve(request) if soon else outcome
-        if theirs is None or outcome.status is not Status.GAVE_UP:
-            return replace(outcome, seconds=perf_counter() - began)
-        ours = outcome.reason.text if outcome.reason else "gave up"
-        reason = Reason(f"{ours}; an installed engine was tried {'before' if soon else 'then'}: {theirs}")
-        return replace(outcome, reason=reason, seconds=perf_counter() - began)
-
-    def lasting(problem: Problem) -> Problem:
-        if memory is None or isinstance(memory, Links):
-            return problem
-        from confab.planner.timed.measuring import with_durations
-
-        return with_durations(problem, memory.statistics)
-
-    timed = None
-    in_part = problem is seen.problem and not seen.whole
-    if needs_others_meanwhile(problem):
-        if problem.weights:
-            raise KnowledgeError("a task whose steps must overlap can't have soft goals; drop the :weight of its goals")
-        problem = lasting(problem if seen.whole else whole())
-        outcome, timed = concurrent(problem, deadline)
-        queries = scene.knowledge.round_trips - asked
+        begin, asked = perf_counter(), scene.knowledge.round_trips
+        task = read_task(scene, goals, memory, options, deadline)
+        quantified = perf_counter() - begin
+        check_goal(scene.iri, task.problem)
+        found = planned(task)
         seconds = {**scene.seconds, "quantify": quantified}
-        return Result(scene, problem, outcome, seconds, queries, None, tuple(goals), timed)
-    if faulty:
-        possible = without(problem, [behavior for behavior, _ in faulty])
-        behavior, why = faulty[0]
-        leaves = options.leave_levels and mode != "paper"
-        if not leaves and _none_at_all(possible, deadline):
-            raise KnowledgeError(why, seen.names.iri(behavior.name))
-        doable, outcome = chosen(possible)
-        problem = replace(problem, goal=doable.goal, weights={})
-        if leaves and outcome.status is Status.UNSOLVABLE:
-            raise KnowledgeError(why, seen.names.iri(behavior.name))
-        if outcome.status is Status.GAVE_UP and outcome.reason:
-            outcome = replace(outcome, reason=replace(outcome.reason, text=f"{outcome.reason.text}; {why}"))
-    else:
-        problem, outcome = chosen(problem)
-    if in_part and (
-        outcome.status is Status.UNSOLVABLE
-        or (outcome.plan and refused(scene.knowledge, seen, outcome.plan, goals, outcome.unmet))
-    ):  # reads the whole scene: there may be a plan in it, or the plan may be invalid in it
-        anew = whole()
-        if anew != seen.problem:
-            in_part = False
-            problem, outcome = chosen(anew)
-    problem = lasting(problem)
-    if outcome.status is Status.UNSOLVABLE and may_overlap_by_need(problem):
-        outcome, timed = concurrent(problem, deadline)
-    elif asks_for_times(problem, options.minimise):
-        outcome, timed = scheduled(problem, outcome, deadline, options.minimise == "makespan")
-    queries = scene.knowledge.round_trips - asked
-    part = seen if in_part else None
-    seconds = {**scene.seconds, "quantify": quantified}
-    return Result(scene, problem, outcome, seconds, queries, part, tuple(goals), timed, mode == "optimal")
-
-
-def _none_at_all(problem: Problem, deadline: Deadline) -> bool:
-    """Return whether the task can be proved unsolvable in half of the remaining time."""
-    limits = Limits(seconds=None if deadline.left is None else deadline.left / 2)
-    return solve(Request(problem, limits=limits)).status is Status.UNSOLVABLE
-
-
-def _by_an_engine(problem: Problem, deadline: Deadline) -> Outcome | str | None:
-    """Return the outcome of an engine that found a plan, or the reason why there is none. Return None if no engine is installed."""
-    from confab.engines import plan_by_engine, some_installed
-
-    if not some_installed(problem):
-        return None
-    try:
-        theirs = plan_by_engine(problem, None, None, deadline.left)
-    except KnowledgeError as error:
-        return str(error)
-    if theirs.status is Status.SOLVED:
-        return theirs
-    return theirs.reason.text if theirs.reason else "it found no plan"
+        queries = scene.knowledge.round_trips - asked
+        return Result(
+            scene, found.problem, found.outcome, seconds, queries, found.part, tuple(goals), found.timed, found.optimal
+        )
 
 
 def result_of(scene: Known, plan: Plan, goals: Facts = ()) -> Result:
@@ -334,12 +168,6 @@ def result_of(scene: Known, plan: Plan, goals: Facts = ()) -> Result:
         soft = problem.weights.keys()
         problem = problem.only({one for one in soft if validate(problem.only(soft - {one}), plan)})
     return Result(scene, problem, Outcome(Status.SOLVED, plan), dict(scene.seconds), goals=texts)
-
-
-def _seen(reading: Reading, observed: str | Path | None) -> Reading:
-    from confab.reasoner.reading.observed import load_observed
-
-    return reading if observed is None else load_observed(Path(observed), reading)
 
 
 AnyStep: TypeAlias = "int | str | tuple[int, ...] | tuple[str, ...] | Step"

@@ -101,8 +101,8 @@ def test_an_installed_engine_runs_if_the_own_search_gives_up(monkeypatch: pytest
 def test_without_a_time_limit_an_engine_runs_after_bounded_work_and_own_search_continues_if_it_fails(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("confab.planning.OURS_WORK", 0)
-    monkeypatch.setattr("confab.planning.find_spec", lambda name: name)
+    monkeypatch.setattr("confab.plan_call.OURS_WORK", 0)
+    monkeypatch.setattr("confab.plan_call.find_spec", lambda name: name)
     monkeypatch.setattr(engines, "some_installed", lambda problem: True)
     scene = confab.load("towers-small")
     assert scene.plan().json()["engine"] == "any"

@@ -71,7 +71,7 @@ def test_the_fuzzer_detects_a_wrong_unsolvable(given: Path, monkeypatch: pytest.
     def no(_: Request) -> Outcome:
         return Outcome(Status.UNSOLVABLE, reason=Reason("seeded"))
 
-    monkeypatch.setattr("confab.planning.solve", no)
+    monkeypatch.setattr("confab.plan_call.solve", no)
     monkeypatch.setattr(fuzz, "DOMAINS", ("ferry",))
     monkeypatch.setitem(fuzz.DOORS, "plan", (lambda _, folder: ["plan", str(folder / "scene.ttl"), "--json"], 1))
     failure = fuzz.run_case("plan", 0, given)

@@ -1,0 +1,297 @@
+"""One planning call: the task is read, searched and, if necessary, scheduled.
+
+```text
+read_task     read the individuals that the task can need, or the whole scene
+planned       if steps must overlap, plan with times
+              otherwise search; if the part of the scene has no valid plan, search in the whole scene
+              schedule the plan, or plan with times if steps may have to overlap
+searched      choose among the soft goals; each choice is a search
+search        the engine that the caller names, or Confab's own search and then an installed engine
+```
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, NamedTuple
+
+from confab.checking import refused
+from confab.known import Known
+from confab.plan_options import NO_ENGINE, PlanOptions
+from confab.planner.certified import certified
+from confab.planner.plan import Limits, Outcome, Reason, Shortening, Status
+from confab.planner.solve import DEFAULT_MODE, Request, solve
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.limits import Deadline, LimitError
+from confab.reasoner.memory.links import Links
+from confab.reasoner.reading.goals import with_goals
+from confab.reasoner.reading.problem import Reading, read
+from confab.reasoner.reading.relevance import recognise
+from confab.reasoner.refining import never_done, without
+from confab.reasoner.symbols import Behavior, GroundBehavior, Problem
+from confab.timing import (
+    asks_for_times,
+    concurrent,
+    may_overlap_by_need,
+    needs_others_meanwhile,
+    scheduled,
+    with_unit_costs,
+)
+
+if TYPE_CHECKING:
+    from confab.memory import Memory
+    from confab.planner.timed.plan import TimedPlan
+
+OURS = 0.6
+"""The share of the time limit that Confab's own search may use; the rest is for an engine, or for scheduling the plan.
+"""
+OURS_WORK = 10_000_000
+"""Maximum work of Confab's own search (states times operators) before an engine is tried, if there is no time limit.
+
+The search does this maximum work in about twenty seconds.
+"""
+
+
+@dataclass(frozen=True)
+class Task:
+    """The task of one planning call.
+
+    `reading` contains the individuals that the task can need, or the whole scene; `problem` is its problem with the goals of the
+    call. `grounds` are the quantified behaviours for the paper's mode.
+    """
+
+    scene: Known
+    goals: list[str]
+    memory: Memory | Links | None
+    options: PlanOptions
+    deadline: Deadline
+    reading: Reading
+    problem: Problem
+    grounds: Mapping[int, tuple[GroundBehavior, ...]] | None
+
+    def whole(self) -> Problem:
+        """Return the problem with all individuals of the scene."""
+        scene = self.scene
+        if "reading" not in scene.__dict__:
+            scene.reading = read(scene.knowledge, self.reading.schema)
+            scene.knowledge.confirm()
+        return with_goals(scene.problem, self.goals)
+
+    def with_measured_durations(self, problem: Problem) -> Problem:
+        """Return a problem with the durations that the memory has measured."""
+        if self.memory is None or isinstance(self.memory, Links):
+            return problem
+        from confab.planner.timed.measuring import with_durations
+
+        return with_durations(problem, self.memory.statistics)
+
+
+class Found(NamedTuple):
+    """What a planning call has found.
+
+    `part` is the part of the scene from which `problem` was read, or None for the whole scene. `optimal` states whether the search
+    looked for an optimal plan.
+    """
+
+    problem: Problem
+    outcome: Outcome
+    timed: TimedPlan | None
+    part: Reading | None
+    optimal: bool
+
+
+class Searching(NamedTuple):
+    """The mode of a search, the share of the time limit that the search may use, and whether the plan is shortened only briefly."""
+
+    mode: str
+    share: float = 1.0
+    brief: bool = False
+
+
+def read_task(
+    scene: Known, goals: list[str], memory: Memory | Links | None, options: PlanOptions, deadline: Deadline
+) -> Task:
+    """Read the task of a planning call; the paper's mode and observed facts require the whole scene."""
+    grounds, paper = None, options.strategy == "paper"
+    if paper or options.observed is not None:
+        reading = scene.reading
+        if options.observed is not None:
+            from confab.reasoner.reading.observed import load_observed
+
+            reading = load_observed(Path(options.observed), reading)
+        problem = with_goals(reading.problem, goals)
+    else:
+        reading = recognise(scene.knowledge, goals)
+        problem = reading.problem
+    if paper:
+        from confab.reasoner.reading.quantification import quantify
+
+        grounds = {level: quantify(scene.knowledge, reading, level) for level in reading.problem.domain.levels}
+    scene.knowledge.confirm()
+    return Task(scene, goals, memory, options, deadline, reading, problem, grounds)
+
+
+def planned(task: Task) -> Found:
+    """Plan, and schedule the plan if the task asks for times."""
+    problem, part = task.problem, None if task.reading.whole else task.reading
+    faulty = [*never_done(problem)]
+    if faulty and part is not None:  # an individual that wasn't read may have the value
+        problem, part = task.whole(), None
+        faulty = [*never_done(problem)]
+    if needs_others_meanwhile(problem):
+        if problem.weights:
+            raise KnowledgeError("a task whose steps must overlap can't have soft goals; drop the :weight of its goals")
+        problem = task.with_measured_durations(problem if task.reading.whole else task.whole())
+        return Found(problem, *concurrent(problem, task.deadline), None, False)
+    if faulty:
+        problem, outcome = searched_without(task, problem, faulty)
+    else:
+        problem, outcome = searched(task, problem)
+    if part is not None and not stands(task, outcome):
+        whole = task.whole()
+        if whole != task.problem:
+            part = None
+            problem, outcome = searched(task, whole)
+    problem, timed = task.with_measured_durations(problem), None
+    if outcome.status is Status.UNSOLVABLE and may_overlap_by_need(problem):
+        outcome, timed = concurrent(problem, task.deadline)
+    elif asks_for_times(problem, task.options.minimise):
+        outcome, timed = scheduled(problem, outcome, task.deadline, task.options.minimise == "makespan")
+    return Found(problem, outcome, timed, part, task.options.strategy == "optimal")
+
+
+def stands(task: Task, outcome: Outcome) -> bool:
+    """Return whether an outcome for a part of the scene may hold in the whole scene: no proof, and no plan with faults there."""
+    if outcome.status is Status.UNSOLVABLE:
+        return False
+    plan, knowledge = outcome.plan, task.scene.knowledge
+    return not (plan and refused(knowledge, task.reading, plan, task.goals, outcome.unmet))
+
+
+def searched_without(task: Task, problem: Problem, faulty: Sequence[tuple[Behavior, str]]) -> tuple[Problem, Outcome]:
+    """Search without behaviours that no plan can contain; if there is no plan without them, the first reason is an error."""
+    possible = without(problem, [behavior for behavior, _ in faulty])
+    behavior, why = faulty[0]
+    error = KnowledgeError(why, task.reading.names.iri(behavior.name))
+    leaves = task.options.leave_levels and task.options.strategy != "paper"
+    if not leaves and none_at_all(possible, task.deadline):
+        raise error
+    chosen, outcome = searched(task, possible)
+    if leaves and outcome.status is Status.UNSOLVABLE:
+        raise error
+    if outcome.status is Status.GAVE_UP and outcome.reason:
+        outcome = replace(outcome, reason=replace(outcome.reason, text=f"{outcome.reason.text}; {why}"))
+    return replace(problem, goal=chosen.goal, weights={}), outcome
+
+
+def none_at_all(problem: Problem, deadline: Deadline) -> bool:
+    """Return whether the task can be proved unsolvable in half of the remaining time."""
+    limits = Limits(seconds=None if deadline.left is None else deadline.left / 2)
+    return solve(Request(problem, limits=limits)).status is Status.UNSOLVABLE
+
+
+# ------------------------------------------------------------------------------------------------------------- searching
+
+
+def searched(task: Task, problem: Problem) -> tuple[Problem, Outcome]:
+    """Search, and choose among soft goals; return the problem with the chosen goals, and the outcome."""
+    mode = task.options.strategy
+    finish = partial(search, task, how=Searching(mode))
+    if not problem.weights:
+        return problem, finish(problem)
+    from confab.planner.preferences import preferred
+
+    alike = with_unit_costs(problem) if task.options.minimise == "steps" else problem
+    brief, seconds = Searching(DEFAULT_MODE if mode == "optimal" else mode, brief=True), task.deadline.left
+    choose = partial(search_in_time, task, brief, (seconds or 0.0) / 2, "half of the time limit, which is for proofs")
+    if seconds is None and mode != "optimal":
+        chosen, outcome = preferred(alike, choose, finish=finish)
+    else:
+        prove = partial(search_in_time, task, Searching(mode, share=0.5), (seconds or 0.0) / 10, "the time limit")
+        chosen, outcome = preferred(alike, choose, prove)
+    return replace(problem, goal=chosen.goal, weights=chosen.weights), outcome
+
+
+def search_in_time(task: Task, how: Searching, least: float, limit: str, problem: Problem) -> Outcome:
+    """Search; if fewer than `least` seconds are left, raise `LimitError` with the name of the limit."""
+    if task.deadline.left is not None and task.deadline.left < least:
+        raise LimitError(limit)
+    return search(task, problem, how)
+
+
+def search(task: Task, problem: Problem, how: Searching) -> Outcome:
+    """Search with the named engine, or with Confab's own search and then an installed engine."""
+    options, deadline = task.options, task.deadline
+    deadline.check("reading the problem")
+    if options.by_engine:
+        from confab.engines import plan_by_engine
+
+        return certified(problem, plan_by_engine(problem, options.engine, options.level, deadline.left))
+    engines = options.leave_levels and options.engine != NO_ENGINE
+    request = own_request(task, problem, how, engines)
+    unlimited = request.limits.seconds is None and how.mode != "paper" and find_spec("unified_planning") is not None
+    again = request if engines and unlimited else None
+    outcome = solve(replace(request, limits=replace(request.limits, work=OURS_WORK)) if again else request)
+    if outcome.status is not Status.GAVE_UP or not engines or deadline.left == 0:
+        return outcome
+    return by_installed_engine(problem, deadline, outcome, again)
+
+
+def own_request(task: Task, problem: Problem, how: Searching, engines: bool) -> Request:
+    """Return the request for Confab's own search; if engines or scheduling may follow, a part of the time is kept for them."""
+    options, seconds, memory = task.options, task.deadline.left, task.memory
+    if seconds is not None:
+        from confab.engines import some_installed
+
+        more = asks_for_times(problem, options.minimise) or (engines and some_installed(problem))
+        seconds *= how.share * (OURS if more else 1.0)
+    shortening: Shortening = "brief" if how.brief else "once" if seconds is None else "repeated"
+    links = (
+        memory
+        if isinstance(memory, Links)
+        else memory.links
+        if memory is not None and options.strategy == "paper"
+        else None
+    )
+    return Request(
+        with_unit_costs(problem) if options.minimise == "steps" else problem,
+        how.mode,
+        Limits(seconds=seconds, shortening=shortening),
+        None if memory is None or isinstance(memory, Links) else memory.advisor,
+        links,
+        task.grounds,
+        options.leave_levels,
+    )
+
+
+def by_installed_engine(problem: Problem, deadline: Deadline, outcome: Outcome, again: Request | None) -> Outcome:
+    """Return the outcome of an installed engine after Confab's own search gave up.
+
+    If the engine finds no plan, the result is the outcome of the own search, which is first repeated with the request `again`, if
+    given.
+    """
+    from confab.engines import plan_by_engine, some_installed
+
+    began = perf_counter() - outcome.seconds
+    tried = some_installed(problem)
+    why = "it found no plan"
+    if tried:
+        try:
+            theirs = plan_by_engine(problem, None, None, deadline.left)
+        except KnowledgeError as error:
+            why = str(error)
+        else:
+            if theirs.status is Status.SOLVED:
+                return replace(theirs, seconds=perf_counter() - began)
+            why = theirs.reason.text if theirs.reason else why
+    outcome = solve(again) if again else outcome
+    if tried and outcome.status is Status.GAVE_UP:
+        ours = outcome.reason.text if outcome.reason else "gave up"
+        reason = Reason(f"{ours}; an installed engine was tried {'before' if again else 'then'}: {why}")
+        outcome = replace(outcome, reason=reason)
+    return replace(outcome, seconds=perf_counter() - began)
