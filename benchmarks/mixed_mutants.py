@@ -43,7 +43,7 @@ from worlds.scenes import scene
 
 CHECKERS = sorted(f"planner/{file.name}" for file in (ROOT / "planner").glob("checked_*.py"))
 PARTS: dict[str, dict[str, str]] = {
-    "recognition": {"reasoner/reading/relevance.py": "guarded"},
+    "recognition": {"reasoner/reading/relevance.py": "recognition"},
     "proofs": {"planner/hierarchical/unsolvability.py": "guarded", "planner/certifying.py": "proofs"},
     "checker of plans": dict.fromkeys(("planner/validation.py", *CHECKERS), "checker"),
     "checker of certificates": dict.fromkeys(

@@ -20,6 +20,7 @@ from random import Random
 from time import process_time
 from types import FrameType
 from typing import Any, TypeVar
+from unittest.mock import patch
 
 from confab.plan_options import NO_ENGINE
 from confab.planner.acting.episode import End
@@ -31,6 +32,8 @@ from confab.reasoner.amounts import written
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.language import DomainError
 from confab.reasoner.limits import LimitError
+from confab.reasoner.reading import relevance
+from confab.reasoner.reading.problem import read_names
 from confab.reasoner.symbols import FALSE, Problem, Symbol
 from confab.scene import Scene, load
 from worlds.corrupted import corrupted, numbered, random_steps
@@ -39,13 +42,14 @@ from worlds.false_certificates import corrupted as corrupted_certificates
 from worlds.interpreter import Interpreter, State, TooManyStatesError
 from worlds.mixed import RandomWorld
 from worlds.scenes import scene
+from worlds.slices import difference
 from worlds.walking import cost, faults
 
 SECONDS, CPU = 3.0, 4.0
 """Time limit of a call in seconds, and CPU seconds after which the call counts as endless."""
 MOST = 5_000
 """Maximum number of nodes of the exhaustive search."""
-OPTIMAL, PAPER, STRICT, EXPORTS, EXECUTIONS, LESSONS, READERS, CERTIFICATES = 3, 2, 3, 8, 6, 8, 250, 4
+OPTIMAL, PAPER, STRICT, EXPORTS, EXECUTIONS, LESSONS, READERS, CERTIFICATES, RECOGNITION = 3, 2, 3, 8, 6, 8, 250, 4, 8
 """Sampling intervals of expensive checks: with an interval n, one of n worlds is checked."""
 LEFT_OUT, CERTIFYING = 3, 100_000
 """Number of behaviours that are left out in turn for false certificates, and maximum work for each certificate."""
@@ -224,7 +228,7 @@ class Judge:
             modes["optimal"] = {"mode": "optimal"}
         if len(self.world.problem.domain.levels) > 1 and self.sampled(STRICT, "strict", "strict"):
             modes["strict levels"] = {"leave_levels": False}
-        if self.only.startswith(("proofs", "certificates")):
+        if self.only.startswith(("proofs", "certificates", "recognition")):
             modes = {}
         elif self.only and "/" not in self.only:
             first = self.only if self.only in modes else "guarded"
@@ -247,6 +251,9 @@ class Judge:
             self.call("certificates", lambda: self.false_certificates(read))
         if self.sampled(CERTIFICATES, "proofs", "certificates", "proofs"):
             self.proofs(read)
+        if self.sampled(RECOGNITION, "recognition", "recognition"):
+            self.call("recognition", lambda: self.recognition(read))
+            self.call("recognition of names", lambda: self.names(file))
         if self.sampled(EXPORTS, "export", "export"):
             for level in self.world.problem.domain.levels:
                 self.export(read, level)
@@ -356,6 +363,52 @@ class Judge:
                 if wanted and got not in wanted:  # the successor has no bounds of sums, which the interpreter respects
                     self.complain("the checker has another successor", "checker", f"{name} {arguments} in {before}")
                     return
+
+    def recognition(self, read: Scene) -> None:
+        """Compare the part of the scene that task recognition selects with the whole scene, for the task and for another goal.
+
+        The last query of recognition, which follows all routes at once, is needed after few other queries only.
+        """
+        few = self.rng.choice((1, 2, relevance.ROUNDS))
+        for meant, goals in ((self.meant, []), self.other_goal()):
+            with patch.object(relevance, "ROUNDS", few):
+                part = relevance.recognise(read.knowledge, goals)
+            try:
+                said = "" if part.whole else difference(meant, Interpreter(part.problem), MOST)
+            except TooManyStatesError:
+                continue
+            if said:
+                self.complain("the part of the scene differs", "recognition", f"{goals}, {few} queries: {said}")
+
+    def other_goal(self) -> tuple[Interpreter, list[str]]:
+        """Return an interpreter of the world with another goal, from a reachable state, and the text of the goal."""
+        state = self.rng.choice(self.reached or [self.meant.initial])
+        symbols = [s for s, slot in self.meant.slots.items() if slot < self.meant.stated]
+        if not symbols:
+            return self.meant, []
+        changed = [s for s in symbols if self.meant.value(state, s) != self.meant.value(self.meant.initial, s)]
+        symbol = self.rng.choice(changed or symbols)
+        value = _text(self.meant.value(state, symbol))
+        words = symbol.arguments[0], symbol.situation, *symbol.arguments[1:], value
+        return self.meant.wanting({**self.meant.problem.goal, symbol: value}), [" ".join(words)]
+
+    def names(self, file: Path) -> None:
+        """Compare the names in the part with those in the whole scene, with further terms that have the same local names."""
+        space = self.rng.choice(("https://example.org/other#", "https://example.org/w/"))
+        lines = list[str]()
+        for name in (*self.world.problem.individuals, *self.world.parents):
+            if self.rng.random() < 0.3:
+                kinds = self.rng.choice(("owl:NamedIndividual, :Kind", ":Kind", "owl:NamedIndividual"))
+                lines.append(f"<{space}{name}> a {kinds} .")
+            if self.rng.random() < 0.2:
+                lines.append(f"<{space}member> a {self.rng.choice(('owl:NamedIndividual, ', ''))}<{space}{name}> .")
+        file.write_text("\n".join([f"@prefix other: <{space}> .", scene(self.world), *lines]), encoding="utf-8")
+        knowledge = load(file).knowledge
+        part, whole = relevance.recognise(knowledge), read_names(knowledge)
+        used = {name for of, members in part.problem.classes.items() if members for name in (of, *members) if name in part.names}
+        wrong = {name: other for name in used if (other := whole.short(part.names.iri(name))) != name}
+        if wrong:
+            self.complain("the part of the scene has other names", "recognition", f"{wrong} {lines}")
 
     def proofs(self, read: Scene) -> None:
         """Certify the task without a search, and judge the certificates without the planner.

@@ -452,7 +452,7 @@ def _namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member])
     rows = graph.select(
         f"SELECT ?x ?named WHERE {{ VALUES ?x {{ {values_of(candidates)} }} BIND(EXISTS {{ ?x a owl:NamedIndividual, ?kind "
         "FILTER(isIRI(?kind) && !STRSTARTS(STR(?kind), STR(owl:))) } AS ?named) "
-        "FILTER(?named || EXISTS { ?member a ?x }) }",
+        "FILTER(?named || EXISTS { ?member a ?x, owl:NamedIndividual }) }",
         SCENE,
     )
     found = {text(x) for x, _ in rows}
