@@ -7,6 +7,7 @@ own limit of CPU time.
 from __future__ import annotations
 
 import math
+import re
 import signal
 import warnings
 import zlib
@@ -57,6 +58,8 @@ MOST_ACTIONS = 1_500
 """Maximum number of grounded behaviours of an imported problem for the exhaustive search."""
 STATES = 3
 """Number of reachable states, and of behaviours in each state, in which the plan checker is compared with the interpreter."""
+CORE_CLASSES = ("Parameter", "Level", "ValueCondition")
+"""Names of classes of the core ontology that only the parts of behaviours belong to."""
 FEW_CASES = 30
 """Maximum number of cases of a certificate that is corrupted, so that its checks take little time."""
 T = TypeVar("T")
@@ -393,22 +396,31 @@ class Judge:
         return self.meant.wanting({**self.meant.problem.goal, symbol: value}), [" ".join(words)]
 
     def names(self, file: Path) -> None:
-        """Compare the names in the part with those in the whole scene, with further terms that have the same local names."""
-        space = self.rng.choice(("https://example.org/other#", "https://example.org/w/"))
-        lines = list[str]()
-        for name in (*self.world.problem.individuals, *self.world.parents):
-            if self.rng.random() < 0.3:
-                kinds = self.rng.choice(("owl:NamedIndividual, :Kind", ":Kind", "owl:NamedIndividual"))
+        """Compare the names in the part with those in the whole scene, with other terms that have the same local names.
+
+        A prefix or only an import leads to the other terms. An individual has the name of a class of the core ontology.
+        """
+        rng, space = self.rng, "https://example.org/other#"
+        names, lines = [*self.world.problem.individuals], list[str]()
+        for name in (*names, *self.world.parents):
+            if rng.random() < 0.3:
+                kinds = rng.choice(("owl:NamedIndividual, <#Kind>", "<#Kind>", "owl:NamedIndividual"))
                 lines.append(f"<{space}{name}> a {kinds} .")
-            if self.rng.random() < 0.2:
-                lines.append(f"<{space}member> a {self.rng.choice(('owl:NamedIndividual, ', ''))}<{space}{name}> .")
-        file.write_text("\n".join([f"@prefix other: <{space}> .", scene(self.world), *lines]), encoding="utf-8")
+            if rng.random() < 0.2:
+                lines.append(f"<#member> a {rng.choice(('owl:NamedIndividual, ', ''))}<{space}{name}> .")
+        prefix = f"@prefix other: <{space}> .\n" if rng.random() < 0.5 else ""
+        text = scene(self.world).replace("owl:imports", "owl:imports <https://example.org/other>,", 1)
+        text = re.sub(rf"(?<!\w):{rng.choice(names)}\b(?![.#])", f":{rng.choice(CORE_CLASSES)}", text)
+        head = "@prefix owl: <http://www.w3.org/2002/07/owl#> .\n<https://example.org/other> a owl:Ontology ."
+        (self.folder / "other.ttl").write_text("\n".join([head, *lines]), encoding="utf-8")
+        file.write_text(prefix + text, encoding="utf-8")
         knowledge = load(file).knowledge
         part, whole = relevance.recognise(knowledge), read_names(knowledge)
-        used = {name for of, members in part.problem.classes.items() if members for name in (of, *members) if name in part.names}
-        wrong = {name: other for name in used if (other := whole.short(part.names.iri(name))) != name}
-        if wrong:
-            self.complain("the part of the scene has other names", "recognition", f"{wrong} {lines}")
+        used = {
+            name for of, its in part.problem.classes.items() if its for name in (of, *its) if name in part.names
+        }
+        if wrong := {name: other for name in used if (other := whole.short(part.names.iri(name))) != name}:
+            self.complain("the part of the scene has other names", "recognition", f"{wrong} {prefix}{lines}")
 
     def proofs(self, read: Scene) -> None:
         """Certify the task without a search, and judge the certificates without the planner.

@@ -296,13 +296,14 @@ class _Draft(Vocabulary):
     def individuals(self) -> None:
         rng, number = self.rng, 0
 
-        def some(kind: str, many: int) -> tuple[str, ...]:
+        def some(letter: str, many: int) -> tuple[str, ...]:
             nonlocal number
             number += many
-            return tuple(f"{kind.lower()[0]}{i}" for i in range(number - many + 1, number + 1))
+            return tuple(f"{letter}{i}" for i in range(number - many + 1, number + 1))
 
-        own, sub = some("A", rng.choice((1, 1, 2, 2, 3))), some("A", rng.choice((0, 0, 1, 1, 2)))
-        b = some("B", rng.choice((0, 1, 1, 2, 2, 3)))
+        own, sub = some("a", rng.choice((1, 1, 2, 2, 3))), some("a", rng.choice((0, 0, 1, 1, 2)))
+        b = some("z", rng.choice((0, 1, 1, 2, 2, 3)))
+        # in sorted order, the names of B are after "true", and the other names are before "false"
         self.classes = {"Truth": (FALSE, TRUE), "A": (*own, *sub), "A1": sub, "B": b}
         self.objects = (*own, *sub, *b)
 
