@@ -416,9 +416,7 @@ class Judge:
         file.write_text(prefix + text, encoding="utf-8")
         knowledge = load(file).knowledge
         part, whole = relevance.recognise(knowledge), read_names(knowledge)
-        used = {
-            name for of, its in part.problem.classes.items() if its for name in (of, *its) if name in part.names
-        }
+        used = {name for of, its in part.problem.classes.items() if its for name in (of, *its) if name in part.names}
         if wrong := {name: other for name in used if (other := whole.short(part.names.iri(name))) != name}:
             self.complain("the part of the scene has other names", "recognition", f"{wrong} {prefix}{lines}")
 

@@ -172,8 +172,7 @@ def _span_to_totals(aggregate: Aggregate, changed: set[str], known: Frame, found
     for scope in _scopes(aggregate.conditions, kinds):
         for condition in scope.conditions:
             if isinstance(condition, ValueCondition) and condition.situation in changed:
-                start = {*condition.arguments, condition.value} - {TRUE, FALSE}
-                _span(scope, start, named, known, found, looked_up)
+                _span(scope, {*condition.arguments, condition.value}, named, known, found, looked_up)
                 left -= {condition.situation}
     if left:  # the facts occur in nested conditions
         found.classes.update(known.names.iri(parameter.kind) for parameter in aggregate.parameters)
@@ -231,7 +230,7 @@ class _Doing:
 def _terms_in(effect: Effect) -> set[str]:
     """Return the terms in the arguments and in the value of an effect."""
     given = (effect.value,) if isinstance(effect, ValueEffect) else terms_of(effect.amount)
-    return {*effect.arguments, *given} - {TRUE, FALSE}
+    return {*effect.arguments, *given}
 
 
 def _given(effect: Effect, looked_up: LookedUp) -> Iterator[frozenset[str]]:
@@ -283,9 +282,9 @@ def _scopes(conditions: Sequence[Condition], kinds: Mapping[str, str]) -> list[_
 def _span(scope: _Scope, start: set[str], more: set[str], known: Frame, found: Routes, looked_up: LookedUp) -> None:
     """Add the cheapest routes from the terms in `start` to all terms of a conjunction and to the terms in `more`."""
     steps = [step for condition in scope.conditions for step in _steps(condition, scope, known)]
-    in_use = {t for c in scope.conditions for t in terms(c)} - {TRUE, FALSE} | more
-    reached = start | {t for t in in_use if not t.startswith("?")}
-    waiting = in_use - reached
+    in_use = more.union(*map(terms, scope.conditions))
+    waiting = {t for t in in_use if t.startswith("?")} - start
+    reached = start | in_use - waiting
     while waiting:
         usable = [step for step in steps if step.source in reached and step.target in waiting]
         if not usable:
