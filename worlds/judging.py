@@ -254,14 +254,14 @@ class Judge:
             self.call("certificates", lambda: self.false_certificates(read))
         if self.sampled(CERTIFICATES, "proofs", "certificates", "proofs"):
             self.proofs(read)
-        if self.sampled(RECOGNITION, "recognition", "recognition"):
-            self.call("recognition", lambda: self.recognition(read))
-            self.call("recognition of names", lambda: self.names(file))
         if self.sampled(EXPORTS, "export", "export"):
             for level in self.world.problem.domain.levels:
                 self.export(read, level)
         if self.sampled(EXECUTIONS, "execute", "execute"):
             self.execution(read, guarded)
+        if self.sampled(RECOGNITION, "recognition", "recognition"):
+            self.call("recognition", lambda: self.recognition(read))
+            self.call("recognition of names", lambda: self.names(file))
 
     def outcome(self, read: Scene, name: str, **options: Any) -> Outcome | None:
         """Plan in one mode, compare the outcome with the exhaustive search, and return the outcome."""

@@ -104,6 +104,13 @@ def test_worlds_whose_situation_types_define_each_other_give_no_wrong_answer(tmp
     assert defined > 1
 
 
+@pytest.mark.usefixtures("unlimited_judge")
+def test_the_part_that_recognition_selects_has_the_same_costs_and_names_as_the_whole_world(tmp_path: Path) -> None:
+    for seed in range(8_400_000, 8_400_006):
+        world, meant = drawn(seed, constrained=0.3)
+        assert not Judge(world, tmp_path, only="recognition", meant=meant).judged().complaints, seed
+
+
 def test_a_certificate_that_tells_a_sum_apart_is_refuted_only_by_states_with_the_same_sum(tmp_path: Path) -> None:
     world, meant = drawn(493_002_793, constrained=0.3)
     assert not Judge(world, tmp_path, only="proofs", meant=meant).judged().complaints

@@ -118,6 +118,13 @@ def test_individuals_that_no_step_requires_or_changes_are_left_out_of_the_slice(
     assert sliced.classes["Spot"] == ()
 
 
+def test_a_class_without_named_individuals_changes_no_name(tmp_path: Path) -> None:
+    more = "<https://example.org/other#x> a owl:Class . <https://example.org/other#one> a <https://example.org/other#x> ."
+    graph = graph_of(f"@prefix other: <https://example.org/other#> .{HEAD}{THINGS}{more}", tmp_path)
+    iri = "https://example.org/world#x"
+    assert recognise(graph).names.short(iri) == read(graph).names.short(iri) == "x"
+
+
 def test_a_situation_type_without_values_in_the_slice_does_not_become_boolean() -> None:
     path = Path(__file__).parents[1] / "planner/cases/values-outside-of-the-slice.ttl"
     slice_, whole = recognise(load(path)).problem, read(load(path)).problem
