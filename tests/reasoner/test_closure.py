@@ -119,7 +119,9 @@ def test_individuals_that_no_step_requires_or_changes_are_left_out_of_the_slice(
 
 
 def test_a_class_without_named_individuals_changes_no_name(tmp_path: Path) -> None:
-    more = "<https://example.org/other#x> a owl:Class . <https://example.org/other#one> a <https://example.org/other#x> ."
+    more = (
+        "<https://example.org/other#x> a owl:Class . <https://example.org/other#one> a <https://example.org/other#x> ."
+    )
     graph = graph_of(f"@prefix other: <https://example.org/other#> .{HEAD}{THINGS}{more}", tmp_path)
     iri = "https://example.org/world#x"
     assert recognise(graph).names.short(iri) == read(graph).names.short(iri) == "x"
