@@ -366,7 +366,7 @@ def _read(source: object) -> KnowledgeGraph:
 
 
 def load_text(content: bytes) -> Scene:
-    """Load a scene from text in RDF/XML, JSON-LD or Turtle, recognised by its first characters.
+    """Load a scene from text in RDF/XML, JSON-LD, Turtle or TriG, recognised by its first characters.
 
     The text may import shipped ontologies.
 
@@ -377,12 +377,9 @@ def load_text(content: bytes) -> Scene:
     """
     from tempfile import TemporaryDirectory
 
-    head = content.lstrip()[:200].lower()
-    xml = head.startswith((b"<?xml", b"<rdf:rdf", b"<!doctype"))
-    suffix = ".owl" if xml else ".jsonld" if head.startswith((b"{", b"[{")) else ".ttl"
     begin = perf_counter()
     with TemporaryDirectory() as folder:
-        file = Path(folder, f"stdin{suffix}")
+        file = Path(folder, "stdin.trig")  # Turtle is also TriG
         file.write_bytes(content)
         try:
             graph = load_graph(file, tolerant=True)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import logging
 import os
 import re
+from codecs import BOM_UTF8
 from collections import Counter
 from functools import lru_cache
 from pathlib import Path
@@ -36,13 +37,16 @@ SYNTAXES = {".ofn": "functional syntax", ".omn": "Manchester syntax", ".owx": "O
 """Formats that aren't supported because no library in use reads them correctly."""
 SIGNS = (
     (rb"(@prefix|@base|PREFIX|BASE)\s", ox.RdfFormat.TURTLE),
-    (rb"[{\[]", ox.RdfFormat.JSON_LD),
+    (rb"\{\s*\"|\[\s*\{", ox.RdfFormat.JSON_LD),
     (rb"(Prefix|Ontology)\s*\(", SYNTAXES[".ofn"]),
     (rb"(Prefix|Ontology):\s", SYNTAXES[".omn"]),
     (rb"(<\?xml[^>]*>\s*)?(<!DOCTYPE\s+Ontology|<Ontology\s)", SYNTAXES[".owx"]),
     (rb"format-version:", SYNTAXES[".obo"]),
+    (rb"<\?xml\s|<!DOCTYPE\s|<rdf:RDF\s", ox.RdfFormat.RDF_XML),
 )
-"""Patterns for the beginning of files with the suffix .owl or .rdf that have another format than RDF/XML."""
+"""Patterns for the beginning of a document, whose format may differ from the format that the suffix of the file names."""
+PREFIXED = (ox.RdfFormat.TURTLE, ox.RdfFormat.TRIG)
+"""Formats whose documents may begin with a prefix."""
 REMOTE = re.compile(rb'"@context"\s*:\s*(\[\s*)?"')
 SECONDS, MEGABYTES = 60.0, 1_000
 """Maximum CPU seconds and megabytes of memory for the parser process of one document."""
@@ -75,19 +79,25 @@ def document(file: Path) -> tuple[bytes, ox.RdfFormat]:
             ending == ".json"
         )
         raise DocumentError(f"unknown kind of file; wanted one of {', '.join(FORMATS)}{saved}")
-    content = file.read_bytes()
-    if form == ox.RdfFormat.RDF_XML:
-        begin = re.sub(rb"^(\xef\xbb\xbf)?(\s*#[^\n]*\n|\s+)*", b"", content[:10_000])
-        form = next((found for sign, found in SIGNS if re.match(sign, begin)), form)
+    content = file.read_bytes().removeprefix(BOM_UTF8)
+    begin = re.sub(rb"^(\s*#[^\n]*\n|\s+)*", b"", content[:10_000])
+    found = next((found for sign, found in SIGNS if re.match(sign, begin)), form)
+    form = form if found in PREFIXED and form in PREFIXED else found
     if isinstance(form, str):
         raise DocumentError(
             f"is in {form}, which isn't read here; open it in Protégé and save it as Turtle or RDF/XML (File, Save as …), or "
-            f"convert it: robot convert -i {file.name} -o {file.stem}.ttl"
+            f"convert it: robot convert -i {file.name} -o {file.stem}.{'owl' if ending == '.ttl' else 'ttl'}"
         )
     if form == ox.RdfFormat.JSON_LD and REMOTE.search(content):
         raise DocumentError("its @context lies elsewhere, and nothing is fetched; put the context itself into the file")
     if form == ox.RdfFormat.RDF_XML:
         content = plain_xml(content)
+    else:
+        try:
+            content.decode("utf-8")
+        except UnicodeDecodeError as error:
+            line = content.count(b"\n", 0, error.start) + 1
+            raise DocumentError(f"line {line} isn't in UTF-8 ({error.reason}); save the file in UTF-8") from error
     return safe(content, form, Path(os.path.realpath(file)).as_uri())
 
 

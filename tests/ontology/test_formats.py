@@ -42,9 +42,30 @@ def test_a_scene_plans_alike_in_every_form(scene: Path, ending: str) -> None:
     assert confab.load(scene.with_suffix(f".{ending}")).plan().plan == wanted
 
 
-def test_turtle_under_another_name_is_read(scene: Path) -> None:
-    file = scene.rename(scene.with_suffix(".owl"))
+@pytest.mark.parametrize("form", [ox.RdfFormat.TURTLE, ox.RdfFormat.RDF_XML, ox.RdfFormat.JSON_LD])
+@pytest.mark.parametrize("ending", ["ttl", "owl", "jsonld"])
+def test_the_content_of_a_file_determines_its_format(scene: Path, form: ox.RdfFormat, ending: str) -> None:
+    prefixes = {"owl": "http://www.w3.org/2002/07/owl#"}
+    quads = [*ox.parse(path=str(scene), base_iri="https://example.org/")]
+    scene.unlink()
+    file = scene.with_suffix(f".{ending}")
+    file.write_bytes(ox.serialize(quads, format=form, prefixes=prefixes) or b"")
     assert load(file).scene == "https://example.org/tearoom-scene"
+
+
+def test_a_byte_order_mark_is_ignored_and_another_encoding_than_utf_8_is_refused_by_line(scene: Path) -> None:
+    text = scene.read_text()
+    scene.write_text(text, encoding="utf-8-sig")
+    assert load(scene).scene == "https://example.org/tearoom-scene"
+    for encoding, line in (("utf-16", 1), ("latin-1", 2)):
+        scene.write_text(f"#\n# Tässchen\n{text}".replace("…", ""), encoding=encoding)
+        with pytest.raises(KnowledgeError, match=f"line {line} isn't in UTF-8 .*; save the file in UTF-8"):
+            load(scene)
+
+
+def test_a_blank_node_at_the_beginning_of_turtle_is_no_json_ld(scene: Path) -> None:
+    scene.write_text("[] a <urn:x:A> .\n[ ] a <urn:x:A> .\n" + scene.read_text())
+    assert load(scene).scene == "https://example.org/tearoom-scene"
 
 
 @pytest.mark.parametrize(
@@ -54,6 +75,7 @@ def test_turtle_under_another_name_is_read(scene: Path) -> None:
         ("a.owl", "# saved by Protégé\nPrefix(:=<http://e.org/>)\nOntology(<http://e.org/>)", "functional syntax"),
         ("a.omn", "Prefix: : <http://e.org/>\nOntology: <http://e.org/>", "Manchester syntax"),
         ("a.owl", "Prefix: : <http://e.org/>\nOntology: <http://e.org/>", "Manchester syntax"),
+        ("a.ttl", "Prefix: : <http://e.org/>\nOntology: <http://e.org/>", "Manchester syntax"),
         ("a.owx", '<?xml version="1.0"?>\n<Ontology xmlns="http://www.w3.org/2002/07/owl#"/>', "OWL/XML"),
         ("a.owl", '<?xml version="1.0"?>\n<Ontology xmlns="http://www.w3.org/2002/07/owl#"/>', "OWL/XML"),
     ],
