@@ -15,12 +15,11 @@ from confab.planner.plan import Plan, Reason, Step, renumbered
 from confab.planner.timed.activities import Activity, InapplicableError, StepEvent, activities, in_sequence
 from confab.planner.timed.exchange import choices_of, exchanged
 from confab.planner.timed.network import Begins, Network, network_of
-from confab.planner.timed.order import BEGIN, END, Order, order_of
+from confab.planner.timed.order import BEGIN, END, Order, TurnId, order_of
 from confab.planner.timed.plan import THESE_STEPS, Slot, TimedPlan
 from confab.planner.timed.schedules import (
     CandidateSchedule,
     Choices,
-    TurnId,
     durations_with,
     least,
     shortest,

@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import Any
 
 from confab.planner.timed.network import ALWAYS, Network, earliest
-from confab.planner.timed.order import BEGIN, END, Order
-from confab.planner.timed.schedules import CandidateSchedule, Choices, TurnId, durations_with, turn_edges
+from confab.planner.timed.order import BEGIN, END, Order, TurnId
+from confab.planner.timed.schedules import CandidateSchedule, Choices, durations_with, turn_edges
 
 WORK = 8.0
 """Maximum deterministic time of the solver; the unit is about a second."""

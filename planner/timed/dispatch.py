@@ -24,12 +24,11 @@ from confab.planner.timed.activities import EventKind, StepEvent, activities
 from confab.planner.timed.call import changed_by, renamed_by, timed_plan
 from confab.planner.timed.exchange import choices_of, exchanged
 from confab.planner.timed.network import Begins, Network, earliest, network_of
-from confab.planner.timed.order import BEGIN, END, Edge, order_of
+from confab.planner.timed.order import BEGIN, END, Edge, TurnId, order_of
 from confab.planner.timed.plan import Slot, TimedPlan
 from confab.planner.timed.schedules import (
     CandidateSchedule,
     Choices,
-    TurnId,
     durations_with,
     rescheduled,
     turn_edges,

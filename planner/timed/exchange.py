@@ -12,9 +12,9 @@ from dataclasses import replace
 
 from confab.planner.plan import Plan, Step
 from confab.planner.timed.network import Network
-from confab.planner.timed.order import Order
+from confab.planner.timed.order import Order, TurnId
 from confab.planner.timed.pieces import duration_of, pieces_of
-from confab.planner.timed.schedules import Choices, TurnId
+from confab.planner.timed.schedules import Choices
 from confab.planner.validation import BehaviorReader, Facts
 from confab.reasoner.amounts import situations_in
 from confab.reasoner.symbols import (

@@ -4,7 +4,8 @@ Two accesses to the same symbol conflict if at least one access changes the symb
 sequence. Therefore every schedule is equivalent to the sequence. Turns are an exception: their order may change. A *turn* is a
 part of the sequence that changes a symbol from its first value and back again. The turns of a symbol can be taken in any order,
 one at a time. The turns of an actor include all symbols about the actor. For example, each turn of a hand picks up and puts
-down an object.
+down an object. The set of symbols with a value, which a condition looks up, has turns too: the objects at a place leave the place,
+and others come, one after another.
 
 The theory is described by Bäckström, "Computational aspects of reordering plans", JAIR 9 (1998). Turns are blocks in the sense of
 Siddiqui and Haslum, "Block-structured plan deordering", AI 2012.
@@ -14,17 +15,19 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import pairwise
 
 from confab.planner.timed.activities import Activity, EventKind, InapplicableError, Key, StepEvent
 from confab.planner.validation import Cell
-from confab.reasoner.symbols import FALSE, Problem, Times
+from confab.reasoner.symbols import Problem, Times
 
 BEGIN, END = 0, 1
 Edge = tuple[int, int, int, int]
 """A precedence: an activity and its begin (0) or end (1), then the later activity and its begin or end."""
+TurnId = tuple[int, int]
+"""The number of a resource, and the number of a turn of this resource."""
 
 
 @dataclass(frozen=True)
@@ -102,21 +105,24 @@ def order_of(problem: Problem, activities: Sequence[Activity], events: Iterable[
     records, touched, starts, ends = _records(activities, events)
     times = problem.times or Times()
     fixed = {(s.situation, s.arguments) for s in times.deadlines}
-    returning = {cell for cell in records if cell not in fixed and _returns(problem, cell, records[cell])}
+    returning = {cell for cell in records if cell not in fixed and _returns(records[cell])}
     actors = dict.fromkeys(actor for one in activities for actor in one.actors)
     owned = {actor: [c for c in returning if actor in c[1] and _sole(c, actors)] for actor in actors}
     resources = [_actor(actor, activities, {c: records[c] for c in owned[actor]}, starts, ends) for actor in actors]
     resources += [Resource((), other) for other in _idle(problem, actors)]
     loose = sorted(cell for cell in returning if not any(actor in cell[1] for actor in actors))
-    resources += [Resource(_turns([records[cell]], ends)) for cell in loose]
-    own = {c: i for i, actor in enumerate(actors) for c in owned[actor]}
-    own |= {cell: len(resources) - len(loose) + i for i, cell in enumerate(loose)}
+    looked = _looked(records, touched)
+    free = {key: groups for key, groups in looked.items() if all(map(_returns, groups))}
+    own: dict[Cell | Key, int] = {c: i for i, actor in enumerate(actors) for c in owned[actor]}
+    for one, groups in [*((cell, [records[cell]]) for cell in loose), *free.items()]:
+        own[one] = len(resources)
+        resources.append(Resource(_turns(groups, ends)))
     turn_of = [{m: t for t, turn in enumerate(r.turns) for m in turn.members} for r in resources]
     edges = dict[Edge, None]()
-    for key, found in records.items():
-        apart = turn_of[own[key]] if key in own else None
-        edges.update(dict.fromkeys(_chained(found, ends, activities, apart)))
-    edges.update(dict.fromkeys(_touching(records, touched, ends)))
+    for cell, found in records.items():
+        edges.update(dict.fromkeys(_chained(found, ends, activities, turn_of[own[cell]] if cell in own else None)))
+    for key, groups in looked.items():
+        edges.update(dict.fromkeys(_touching(groups, ends, turn_of[own[key]] if key in own else None)))
     for resource in resources:
         for turn in resource.turns if resource.actor is not None else ():
             its = [m for m in turn.members if resource.actor in activities[m].actors]
@@ -161,11 +167,10 @@ def _records(
     return cells, values, starts, ends
 
 
-def _returns(problem: Problem, cell: Cell, records: Sequence[_Record]) -> bool:
-    """Return whether some activity changes a symbol, and the last change restores the first value."""
+def _returns(records: Sequence[_Record]) -> bool:
+    """Return whether some access changes a symbol, and the last change restores the first value."""
     written = [record.written for record in records if record.written is not None]
-    first = written[0][0] if written else FALSE
-    return bool(written) and written[-1][1] == first
+    return bool(written) and written[-1][1] == written[0][0]
 
 
 def _sole(cell: Cell, actors: Mapping[str, None]) -> bool:
@@ -256,27 +261,40 @@ def _chained(
             last, readers = record, [r for r in readers if r.activity == record.activity and r.high == END]
 
 
+def _looked(
+    records: Mapping[Cell, Sequence[_Record]], values: Mapping[Key, Sequence[_Record]]
+) -> dict[Key, list[list[_Record]]]:
+    """Return the accesses to each looked-up set of symbols with a value: a group for each symbol that enters or leaves the set.
+
+    A change is represented by whether the symbol has the value before and after. The first group also contains the look-ups.
+    """
+    found: dict[Key, dict[Cell, list[_Record]]] = defaultdict(dict)
+    for cell, its in records.items() if values else ():
+        for record in its:
+            for value in set(record.written or ()) if record.written and record.written[0] != record.written[1] else ():
+                if (cell[0], value) in values:
+                    before, after = (str(one == value) for one in record.written or ())
+                    changed = replace(record, written=(before, after))
+                    found[cell[0], value].setdefault(cell, []).append(changed)
+    for key, groups in found.items():
+        next(iter(groups.values())).extend(values[key])
+    return {key: list(groups.values()) for key, groups in found.items()}
+
+
 def _touching(
-    records: Mapping[Cell, Sequence[_Record]], values: Mapping[Key, Sequence[_Record]], ends: Mapping[int, int]
+    groups: Sequence[Sequence[_Record]], ends: Mapping[int, int], turn_of: Mapping[int, int] | None
 ) -> Iterator[Edge]:
-    """Yield the edges between each look-up of all symbols with a value and the changes from or to this value."""
-    if not values:
-        return
-    touches: dict[Key, list[_Record]] = defaultdict(list)
-    for (situation, _), found in records.items():
-        for record in found:
-            for value in set(record.written or ()):
-                if record.written is not None and record.written[0] != record.written[1]:
-                    touches[situation, value].append(record)
-    for key, looks in values.items():
-        for look in looks:
-            for touch in touches.get(key, ()):
-                if touch.activity == look.activity:
-                    continue
-                one, other = (touch, look) if touch.position < look.position else (look, touch)
-                if one.high == END and ends[one.activity] > other.position:
-                    raise InapplicableError("a step reads a value that another step is still changing")
-                yield one.activity, one.high, other.activity, other.low
+    """Yield the edges between look-ups of a set and its changes; if the set has turns, only edges within a turn."""
+    every = [record for its in groups for record in its]
+    for look in (record for record in every if record.written is None):
+        for touch in (record for record in every if record.written is not None):
+            apart = turn_of is not None and turn_of[touch.activity] != turn_of[look.activity]
+            if apart or touch.activity == look.activity:
+                continue
+            one, other = (touch, look) if touch.position < look.position else (look, touch)
+            if one.high == END and ends[one.activity] > other.position:
+                raise InapplicableError("a step reads a value that another step is still changing")
+            yield one.activity, one.high, other.activity, other.low
 
 
 def _latest(

@@ -1,8 +1,8 @@
 """Schedules of activities: the order of the turns of each resource, the actor of each turn, and the begins of activities.
 
-The first schedule is greedy. The turns are assigned in the order of the sequence, each to the actor that is free first. Then a
-tabu search exchanges turns on the critical path (Nowicki and Smutnicki, "A fast taboo search algorithm for the job shop
-problem", Management Science 42, 1996). If OR-Tools is installed, CP-SAT improves the result (`confab.planner.timed.cpsat`).
+The first schedule has the order of the sequence or is made by list scheduling (`confab.planner.timed.listing`). Then a tabu
+search exchanges turns on the critical path (Nowicki and Smutnicki, "A fast taboo search algorithm for the job shop problem",
+Management Science 42, 1996). If OR-Tools is installed, CP-SAT improves the result (`confab.planner.timed.cpsat`).
 """
 
 from __future__ import annotations
@@ -13,8 +13,9 @@ from itertools import pairwise
 from math import inf
 from time import perf_counter
 
+from confab.planner.timed.listing import Listing
 from confab.planner.timed.network import Begins, Network, earliest
-from confab.planner.timed.order import BEGIN, END, Edge, Order, Turn
+from confab.planner.timed.order import BEGIN, END, Edge, Order, Turn, TurnId
 
 ROUNDS = 100
 """Maximum number of exchanges of turns without a better schedule."""
@@ -22,9 +23,6 @@ MOST_ARCS = 400_000
 """Maximum number of arcs that exchanges of turns process."""
 TABU = 8
 """Number of further exchanges during which the search doesn't undo an exchange."""
-
-TurnId = tuple[int, int]
-"""The number of a resource, and the number of a turn of this resource."""
 
 
 @dataclass(frozen=True)
@@ -155,47 +153,11 @@ class _Search:
         return None if begins is None else CandidateSchedule(turns, begins)
 
     def starts(self) -> Iterator[list[list[TurnId]]]:
-        """Yield the orders of turns that lead to the first schedules.
-
-        The first order keeps the actors of the sequence. In the second order, the actor that is free first takes each turn.
-        """
-        own = [[(r, t) for t in range(len(one.turns))] for r, one in enumerate(self.order.resources)]
-        yield own
-        if self.choices.of:
-            yield self.shared()
-
-    def shared(self) -> list[list[TurnId]]:
-        """Return the turns in the order of the sequence; the actor with the least work takes each turn.
-
-        An actor takes its next turn only after its current turn.
-        """
-        work = [0] * len(self.order.resources)
-        lines: list[list[TurnId]] = [[] for _ in self.order.resources]
-        left: dict[TurnId, int] = {}
-        holding: dict[int, TurnId] = {}
-        for its_turns in self.turns_of:
-            for turn in its_turns:
-                resource = turn[0]
-                if turn not in left:
-                    left[turn] = len(self.order.resources[resource].turns[turn[1]].members)
-                    able = self.choices.of.get(turn, (resource,))
-                    free = [one for one in able if one not in holding] or [resource]
-                    chosen = min(free, key=lambda one: (work[one] + self.cost(turn, one), able.index(one)))
-                    lines[chosen].append(turn)
-                    work[chosen] += self.cost(turn, chosen)
-                    if self.order.resources[resource].actor is not None:
-                        holding[chosen] = turn
-                left[turn] -= 1
-                if not left[turn]:
-                    for one in [one for one, its in holding.items() if its == turn]:
-                        del holding[one]
-        return lines
-
-    def cost(self, turn: TurnId, resource: int) -> int:
-        """Return the work of a turn for a resource: the sum of the durations of its activities."""
-        its = self.choices.lasts.get((turn, resource), {})
-        members = self.order.resources[turn[0]].turns[turn[1]].members
-        return sum(its.get(member, self.network.durations[member]) for member in members)
+        """Yield the orders of turns that lead to the first schedules: the order of the sequence, and list scheduling."""
+        yield [[(r, t) for t in range(len(one.turns))] for r, one in enumerate(self.order.resources)]
+        listed = Listing(self.order, self.network, self.choices.of, self.choices.lasts).turns()
+        if listed is not None:
+            yield listed
 
     def improved(self, best: CandidateSchedule, until: float, bound: int) -> CandidateSchedule:
         """Return the best schedule after exchanges of turns on the critical path."""
