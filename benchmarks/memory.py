@@ -153,7 +153,7 @@ def curve(world: str = "laboratory", episodes: int = 3) -> None:
         before = "a lesson in the small world" if not number else f"{number} episode{'s' * (number > 1)} more"
         print(f"| after {before} | {shown(led, seconds, large)} | {len(rules_in(experience))} |", flush=True)
         if led.plan is not None:
-            live(experience, large, led.plan)
+            live(experience, [(large, led.plan)])
 
 
 def said(worlds: tuple[str, ...] = ("gallery", "canteen", "laboratory")) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import AbstractContextManager, nullcontext, suppress
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import chain
@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 from confab.accepting import AnyPlan, plan_of
 from confab.planner.paper.learning import learn as learn_plan
 from confab.planner.plan import Plan, Step
-from confab.reasoner.files import alone, write_whole
+from confab.reasoner.files import alone, has_content, write_whole
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.memory.experience import (
     ITSELF,
@@ -50,8 +50,8 @@ if TYPE_CHECKING:
     from confab.reasoner.symbols import Problem
 
 
-DISTURBED = "an episode with an intervention teaches only failed behaviours and measured durations"
-"""Message on an episode whose steps aren't learned."""
+UNTAUGHT = "no step was executed as planned, and no behaviour failed"
+"""Message on an episode from which nothing but durations is learned."""
 MOST_LINKS = 20_000
 """Maximum number of the paper's links in a memory. If a plan would add more links, it adds no links at all, but only rules and
 counts for the default planner.
@@ -173,7 +173,7 @@ class Memory(metaclass=RightNames):
         plan = plan_of(plan, problem)
         try:
             links = self._linked(scene, plan) if failed is None else self.links
-            live(self.experience, problem, plan, failed)
+            live(self.experience, [(problem, plan)], failed)
         except LearningError as error:
             raise KnowledgeError(str(error)) from error
         self.links = links
@@ -230,7 +230,7 @@ class Memory(metaclass=RightNames):
             self.trusted.add(replica)
 
     def live(self, problem: Problem, episode: Episode) -> bool:
-        """Learn from an execution. After an intervention or a failure, only the failed behaviours are learned, otherwise all steps.
+        """Learn from an execution: from the steps that were executed as planned, and from the failed behaviours.
 
         Parameters
         ----------
@@ -243,17 +243,15 @@ class Memory(metaclass=RightNames):
         bool
             Whether steps or failures were learned.
         """
+        from confab.planner.acting.executed import as_planned
         from confab.planner.experience.lessons import live
 
         self.measure(problem, episode)
-        begun = replace(problem, initial=episode.initial, goal=episode.goal)
         failures = list(failed_steps(problem, episode))
-        whole = not episode.interventions and not episode.failures
-        with suppress(LearningError):  # the executed steps aren't applicable in the first observed state
-            if whole or failures:
-                live(self.experience, begun, episode.done if whole else Plan(()), failures=failures)
-                return True
-        return False
+        parts = list(as_planned(problem, episode))
+        if parts or failures:
+            live(self.experience, parts, failures=failures)
+        return bool(parts or failures)
 
     def measure(self, problem: Problem, done: Episode | Report) -> None:
         """Learn the durations of the primitives that succeeded in an episode, or in the rollouts of a plan in physics.
@@ -476,6 +474,11 @@ def endpoint(source: str | Path) -> str | None:
     """
     match = re.match(r"(https?):/+(.*)", str(source))
     return f"{match[1]}://{match[2]}" if match else None
+
+
+def memory_at(target: Path, scene: Known) -> Memory:
+    """Return the memory in a file or at an endpoint; return a new memory if the file is missing or empty."""
+    return Memory.load(target, scene) if endpoint(target) or has_content(target) else Memory.of(scene)
 
 
 def undisturbed(target: str | Path) -> AbstractContextManager[None]:

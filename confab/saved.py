@@ -21,12 +21,13 @@ from confab.planner.acting.episode import (
     Replan,
     Seen,
     Surprise,
+    situation,
 )
 from confab.planner.acting.symbolic_world import with_individual
 from confab.planner.plan import Plan, Reason, Step
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.reading.goals import parse_fact
-from confab.reasoner.symbols import Problem, State, Symbol
+from confab.reasoner.symbols import Problem, Symbol
 
 if TYPE_CHECKING:
     from confab.execution import Execution
@@ -69,7 +70,7 @@ def read_episode(scene: Known, path: Path) -> Execution:
             _plan(data["planned"], path, problem),
             _plan(data["steps"], path, problem),
             initial,
-            _observed(initial, course),
+            situation(initial, course),
             dict(parse_fact(problem, goal) for goal in data["goal"]),
             events,
             people,
@@ -219,14 +220,3 @@ def _replan(one: Data, path: Path, problem: Problem) -> Replan:
 
 def _failure(one: Data, done: Mapping[tuple[int, ...], Step]) -> Failure:
     return Failure(done[tuple(one["path"])], str(one["code"]), tuple(one["objects"]), str(one["message"]), {})
-
-
-def _observed(initial: State, course: Sequence[Seen]) -> dict[Symbol, str]:
-    """Return the state after all observed changes."""
-    state = dict(initial)
-    for seen in course:
-        if seen.value is None:
-            state.pop(seen.symbol, None)
-        else:
-            state[seen.symbol] = seen.value
-    return state

@@ -61,15 +61,20 @@ NAMED = 3
 """Maximum number of unknown terms of a memory that a message names."""
 
 
-def memory_for(path: Path | None, none: bool, scene: Scene) -> Memory | None:
-    """Return the memory in a file; return None if no file is given, or if the file can't be read."""
+def memory_for(path: Path | None, none: bool, scene: Scene, new: bool = False) -> Memory | None:
+    """Return the memory in a file; return None if no file is given, or if the file can't be read.
+
+    If `new`, a missing file is a new memory.
+    """
     if path is not None and none:
         raise KnowledgeError("--memory and --no-memory exclude each other; give one")
     if path is None:
         return None
-    from confab.memory import Memory
+    from confab.memory import Memory, memory_at
 
     try:
+        if new and not path.is_file():
+            return memory_at(path, scene)
         lines = None
         if path.is_file():
             from confab.authoring import unknown_terms

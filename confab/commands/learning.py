@@ -74,8 +74,7 @@ def learn(
     """Learn from solutions of scenes, a demonstration, or episodes."""
     from confab.curve import Curve, require_drawable
     from confab.interchange import read_plan
-    from confab.memory import DISTURBED, MOST_LINKS, Memory, undisturbed
-    from confab.reasoner.files import has_content
+    from confab.memory import MOST_LINKS, UNTAUGHT, memory_at, undisturbed
 
     remembered: Memory | None = None
     status, curve = YES, Curve()
@@ -87,7 +86,7 @@ def learn(
             advance(f"planning in {name}", 0)
             loaded = load_scene(name)
             if remembered is None:
-                remembered = Memory.load(memory, loaded) if has_content(memory) else Memory.of(loaded)
+                remembered = memory_at(memory, loaded)
             if plot is not None:
                 curve.measure(name, loaded, remembered)
             links = remembered.links
@@ -97,7 +96,7 @@ def learn(
                 for episode in lived:
                     if not remembered.live(loaded.problem, loaded.read_episode(episode).episode):
                         status = NO
-                        remark(f"{episode}: no steps were learned; {DISTURBED}")
+                        remark(f"{episode}: nothing was learned: {UNTAUGHT}")
                 advance(f"learned {name}", 2)
             else:
                 result = loaded.plan()

@@ -33,7 +33,7 @@ from confab.commands.options import (
 from confab.examples import examples
 from confab.planner.solve import DEFAULT_MODE, Mode
 from confab.progress import progress
-from confab.reasoner.files import check_folder, has_content
+from confab.reasoner.files import check_folder
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.kinds import EPISODE, FILM, MEMORY, PICTURE, PLAN, REPORT, VERDICTS
 from confab.terminal import EXIT, GAVE_UP, NO, YES, limited, remark, show_result, told
@@ -245,10 +245,10 @@ def verify(
     if not (perturb or noise):  # with perturbations, a failure in one rollout says nothing about the scene
         keep(loaded, refuted_in(loaded, report))
     if memory is not None:
-        from confab.memory import Memory, undisturbed
+        from confab.memory import memory_at, undisturbed
 
         with undisturbed(memory):
-            remembered = Memory.load(memory, loaded) if has_content(memory) else Memory.of(loaded)
+            remembered = memory_at(memory, loaded)
             remembered.measure(loaded.problem, report)
             remembered.save(memory)
     if out is not None:
@@ -326,16 +326,14 @@ def execute(
 ) -> None:
     """Execute a task in a closed loop, with repair and replanning."""
     from confab.live import both, spectator
-    from confab.memory import DISTURBED, Memory, undisturbed
+    from confab.memory import UNTAUGHT, memory_at, undisturbed
 
     with ExitStack() as stack:
         stack.enter_context(limited(time_limit))
         loaded = load_scene(scene, iri)
-        remembered = memory_for(memory, no_memory, loaded)
+        remembered = memory_for(memory, no_memory, loaded, new=learn)
         if learn and (memory is None or remembered is None):
-            raise KnowledgeError(
-                "--learn needs a memory that can be read: give --memory FILE ('confab learn' makes one)"
-            )
+            raise KnowledgeError("--learn needs --memory FILE, a memory that can be read or a new file")
         observer = stack.enter_context(spectator())
         if serve_at is not None:
             from confab.serving import serving
@@ -366,9 +364,9 @@ def execute(
         keep(loaded, [one for one in execution.episode.refuted if met.isdisjoint(one.individuals)])
     if learn and memory is not None:
         with undisturbed(memory):  # other processes may have changed the file during the episode
-            newest = Memory.load(memory, loaded)
+            newest = memory_at(memory, loaded)
             if not newest.live(loaded.problem, execution.episode):
-                remark(f"no steps were learned; {DISTURBED}")
+                remark(f"nothing was learned: {UNTAUGHT}")
             newest.save(memory)
     if save is not None:
         execution.save(save)

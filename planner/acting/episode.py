@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -97,6 +98,19 @@ class Seen:
     seconds: float
     symbol: Symbol
     value: str | None
+
+
+def situation(initial: State, course: Iterable[Seen], seconds: float = math.inf) -> dict[Symbol, str]:
+    """Return the situation at a time: the initial situation with the changes that were observed until this time."""
+    state = dict(initial)
+    for seen in course:
+        if seen.seconds > seconds:
+            continue
+        if seen.value is None:
+            state.pop(seen.symbol, None)
+        else:
+            state[seen.symbol] = seen.value
+    return state
 
 
 @dataclass(frozen=True)

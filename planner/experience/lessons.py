@@ -89,21 +89,19 @@ def variants(problem: Problem) -> Iterator[Problem]:
 
 def live(
     experience: Experience,
-    problem: Problem,
-    plan: Plan,
+    parts: Iterable[tuple[Problem, Plan]],
     failed: tuple[int, ...] | None = None,
     failures: Iterable[tuple[Problem, Step, Sequence[int]]] = (),
 ) -> None:
-    """Learn from an executed plan.
+    """Learn from the executed plans of one episode.
 
     Parameters
     ----------
     experience : Experience
-    problem : Problem
-        The problem whose initial state is the state before the plan.
-    plan : Plan
+    parts : iterable of (problem, plan)
+        Executed plans, each with a problem whose initial state is the state before the plan.
     failed : path of a step, optional
-        The step that failed; later steps weren't tried.
+        The step of the plan that failed; later steps weren't tried.
     failures : iterable of (problem, step, path)
         Other steps of the most abstract level that failed, each with its problem, and the path of its failed sub-step.
 
@@ -112,13 +110,14 @@ def live(
     LearningError
         The preconditions of a step don't hold in the state before the step. The experience is unchanged.
     """
-    using = compiled(problem)
-    lesson = record(experience, problem, using) if failed is None and plan.steps else Lesson()
-    if plan.steps:
-        lesson += learned(experience, problem, plan, using, failed)
-        lesson = with_first_record(experience, lesson, problem, using) if failed is None else lesson
+    lesson = Lesson()
+    for problem, plan in parts:
+        using = compiled(problem)
+        own = record(experience, problem, using) if failed is None else Lesson()
+        own += learned(experience, problem, plan, using, failed)
+        lesson += with_first_record(experience, own, problem, using) if failed is None else own
     for there, step, path in failures:
-        lesson += lesson_of_failure(experience, there, step, path[1:], using)
+        lesson += lesson_of_failure(experience, there, step, path[1:], compiled(there))
     experience.learn(lesson)
 
 

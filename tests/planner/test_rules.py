@@ -251,11 +251,11 @@ def test_a_preference_that_flips_after_forty_episodes_is_relearned_within_ten() 
     assert one is not None and hands(one) == {"hand1"}  # either hand could do all steps
     other = Plan(tuple(map(by_the_other_hand, one.steps)))
     for _ in range(40):
-        live(experience, within, other)
+        live(experience, [(within, other)])
     assert hands(plan(within, Advisor(experience)).plan) == {"hand2"}
     episodes = 0
     while hands(plan(within, Advisor(experience)).plan) != {"hand1"}:
-        live(experience, within, one)
+        live(experience, [(within, one)])
         episodes += 1
     assert episodes <= 10
 
@@ -266,7 +266,7 @@ def test_a_hand_that_failed_at_a_place_is_avoided_there_and_the_method_gets_no_f
     assert made is not None
     top = next(step for step in made.steps if step.behavior == "B1_MOVE")
     put = next(step for step in top.walk() if step.behavior == "B3_REACH_HAND_LOCATION")
-    live(experience, within, Plan(()), failures=[(within, top, put.path)])
+    live(experience, [], failures=[(within, top, put.path)])
     hand, place = put.arguments
     again = plan(within, Advisor(experience)).plan
     assert again is not None and validate(within, again) == []
@@ -317,7 +317,7 @@ def test_a_step_without_refinement_is_not_tried_again_after_a_lesson_or_an_episo
         assert led.plan is not None and alone.plan is not None
         assert led.plan.length == alone.plan.length
         assert (expanded(led), led.misses) == (10, 0) < (expanded(alone), alone.misses)
-        live(experience, within, led.plan)
+        live(experience, [(within, led.plan)])
 
 
 def test_regression_gives_rules_whose_conditions_have_roles_and_no_individuals() -> None:
@@ -375,7 +375,7 @@ def test_rules_are_followed_in_refinements_with_most_of_the_search_effort() -> N
     assert validate(few, led.plan) == []
     assert led.misses < alone.misses
     assert expanded(led, 2) <= led.plan.length[2]
-    live(experience, few, led.plan)
+    live(experience, [(few, led.plan)])
     again = plan(few, Advisor(experience), improve=0)
     assert expanded(again, 2) <= 1.1 * again.plan.length[2] if again.plan else False
 
@@ -626,7 +626,7 @@ def test_a_plan_that_leaves_a_level_teaches_rules_of_lower_levels() -> None:
     assert validate(within, mixed) == []
     experience = Experience("robot")
     # the second parcel is loaded at the place where the refinement of the first step left the van
-    live(experience, within, mixed)
+    live(experience, [(within, mixed)])
     assert min(within.domain.behaviors[rule.does[0]].level for rule in rules_in(experience)) == 2
 
 

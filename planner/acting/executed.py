@@ -1,0 +1,63 @@
+"""The steps of an episode from which rules are learned: the whole steps that were executed as planned.
+
+An intervention, a failure or an unexpected observation divides an episode into parts. Each part is a valid plan from the situation
+that was observed before its first step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from confab.planner.acting.episode import Episode, InterventionKind, situation
+from confab.planner.acting.symbolic_world import met, with_individual
+from confab.planner.plan import Plan, Step
+from confab.planner.validation import carried_out, open_goals, successor
+from confab.reasoner.symbols import FALSE, Problem, State
+
+
+def as_planned(problem: Problem, episode: Episode) -> Iterator[tuple[Problem, Plan]]:
+    """Yield the parts of an episode that were executed as planned, each with its problem.
+
+    A part consists of consecutive first-level steps. The plan checker accepts each step in the situation that was observed before
+    the step, and no primitive of the step had an unexpected effect. The initial state of the problem is the situation that was
+    observed before the part, and the goals of the problem are the goals of the episode that held after the part.
+    """
+    problem = with_newcomers(problem, episode)
+    part, start, expected = list[Step](), problem, dict(episode.initial)
+    for step in episode.done.steps:
+        done = {(low.path, low.behavior, low.arguments) for low in Plan((step,)).primitives}
+        events = [e for e in episode.events if (e.step.path, e.step.behavior, e.step.arguments) in done]
+        before = situation(episode.initial, episode.course, events[0].begin)
+        here = replace(problem, initial=before, goal={})
+        whole = not any(event.surprises for event in events) and not carried_out(here, Plan((step,)))
+        if part and not (whole and equal(before, expected)):
+            yield with_reached_goals(start, expected, episode.goal), Plan(tuple(part))
+            part = []
+        if whole:
+            start, part, expected = start if part else here, [*part, step], before
+            for low in Plan((step,)).primitives:
+                expected = successor(problem, problem.domain.behaviors[low.behavior], low.arguments, expected) or {}
+    if part:
+        yield with_reached_goals(start, expected, episode.goal), Plan(tuple(part))
+
+
+def with_newcomers(problem: Problem, episode: Episode) -> Problem:
+    """Return a problem with the individuals that were added or discovered during an episode."""
+    for intervention, _ in episode.interventions:
+        if intervention.change is InterventionKind.ADD:
+            problem = with_individual(problem, intervention.individual, intervention.kind)
+    for found, _ in episode.discovered:
+        problem = met(problem, found)
+    return problem
+
+
+def with_reached_goals(problem: Problem, after: State, goal: State) -> Problem:
+    """Return a problem with those goals that hold in the state `after`."""
+    left = {fact.symbol for fact in open_goals(replace(problem, initial=after, goal=goal))}
+    return replace(problem, goal={symbol: value for symbol, value in goal.items() if symbol not in left})
+
+
+def equal(one: State, other: State) -> bool:
+    """Return whether two states have the same facts; a symbol without a value is false."""
+    return all(one.get(symbol, FALSE) == other.get(symbol, FALSE) for symbol in one.keys() | other.keys())
