@@ -16,6 +16,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib.util import find_spec
+from math import inf
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, NamedTuple
@@ -55,6 +56,10 @@ OURS_WORK = 10_000_000
 
 The search does this maximum work in about twenty seconds.
 """
+CHOICE = 0.25
+"""The share of the remaining time in which a plan for one choice of soft goals is searched."""
+CHOICE_WORK = 2_000_000
+"""Maximum work of the search of a plan for one choice of soft goals, if there is no time limit."""
 
 
 @dataclass(frozen=True)
@@ -106,11 +111,15 @@ class Found(NamedTuple):
 
 
 class Searching(NamedTuple):
-    """The mode of a search, the share of the time limit that the search may use, and whether the plan is shortened only briefly."""
+    """The mode of a search, the share of the time limit that the search may use, and whether the plan is shortened only briefly.
+
+    If `bounded` is true and there is no time limit, the work of the search is limited. A bounded search uses no engine.
+    """
 
     mode: str
     share: float = 1.0
     brief: bool = False
+    bounded: bool = False
 
 
 def read_task(
@@ -208,7 +217,12 @@ def searched(task: Task, problem: Problem) -> tuple[Problem, Outcome]:
 
     alike = with_unit_costs(problem) if task.options.minimise == "steps" else problem
     brief, seconds = Searching(DEFAULT_MODE if mode == "optimal" else mode, brief=True), task.deadline.left
-    choose = partial(search_in_time, task, brief, (seconds or 0.0) / 2, "half of the time limit, which is for proofs")
+    bounded = brief._replace(share=CHOICE, bounded=True)
+
+    def choose(choice: Problem) -> Outcome:
+        how = brief if choice.goal.keys().isdisjoint(problem.weights) else bounded
+        return search_in_time(task, how, (seconds or 0.0) / 2, "half of the time limit, which is for proofs", choice)
+
     if seconds is None and mode != "optimal":
         chosen, outcome = preferred(alike, choose, finish=finish)
     else:
@@ -232,7 +246,7 @@ def search(task: Task, problem: Problem, how: Searching) -> Outcome:
         from confab.engines import plan_by_engine
 
         return certified(problem, plan_by_engine(problem, options.engine, options.level, deadline.left))
-    engines = options.leave_levels and options.engine != NO_ENGINE
+    engines = options.leave_levels and options.engine != NO_ENGINE and not how.bounded
     request = own_request(task, problem, how, engines)
     unlimited = request.limits.seconds is None and how.mode != "paper" and find_spec("unified_planning") is not None
     again = request if engines and unlimited else None
@@ -261,7 +275,7 @@ def own_request(task: Task, problem: Problem, how: Searching, engines: bool) -> 
     return Request(
         with_unit_costs(problem) if options.minimise == "steps" else problem,
         how.mode,
-        Limits(seconds=seconds, shortening=shortening),
+        Limits(seconds=seconds, work=CHOICE_WORK if how.bounded and seconds is None else inf, shortening=shortening),
         None if memory is None or isinstance(memory, Links) else memory.advisor,
         links,
         task.grounds,

@@ -81,6 +81,7 @@ class _Choices:
     def __init__(self, problem: Problem, search: Search, prove: Search | None) -> None:
         self.problem, self.search, self.prove, self.weights = problem, search, prove, problem.weights
         self.outcomes: dict[Goals, Outcome] = {}
+        self.conflicts: list[tuple[frozenset[tuple[Symbol, str]], Outcome]] = []
         self.bounds: dict[Goals, Fraction | None] = {}
 
     def task(self, kept: Goals) -> Problem:
@@ -90,16 +91,26 @@ class _Choices:
     def outcome(self, kept: Goals) -> Outcome:
         """Return the outcome of planning for a choice.
 
-        If a limit ends a search, the outcome has the status "gave up". If a limit ends the first search, the method raises
-        `LimitError` instead.
+        There is no search if goals of the choice are known to exclude each other, or if no plan was found for some of the goals
+        alone. If a limit ends a search, the outcome has the status "gave up". If a limit ends the first search, the method
+        raises `LimitError` instead.
         """
         if kept not in self.outcomes:
+            task = self.task(kept)
+            goals = task.goal_on(task.domain.levels[-1]).items()
+            if (known := next((outcome for unmet, outcome in self.conflicts if unmet <= goals), None)) is not None:
+                return self.outcomes.setdefault(kept, known)
+            if any(fewer < kept and outcome.plan is None for fewer, outcome in self.outcomes.items()):
+                return Outcome(Status.GAVE_UP)
             try:
-                self.outcomes[kept] = self.search(self.task(kept))
+                found = self.outcomes[kept] = self.search(task)
             except LimitError:
                 if not self.outcomes:
                     raise
                 return Outcome(Status.GAVE_UP)
+            if found.certificate is not None and found.certificate.unmet:
+                unmet = frozenset((fact.symbol, fact.value) for fact in found.certificate.unmet)
+                self.conflicts.append((unmet, found))
         return self.outcomes[kept]
 
     def least(self, kept: Goals) -> Fraction | None:

@@ -15,6 +15,7 @@ from click.testing import CliRunner
 import confab
 import ontology
 from confab.cli import app
+from confab.plan_call import CHOICE_WORK
 from confab.planner.plan import Limits, Outcome, Status
 from confab.planner.plan_costs import cost_of
 from confab.planner.preferences import preferred
@@ -68,6 +69,36 @@ def test_a_soft_goal_that_cannot_be_met_is_left_and_a_hard_one_makes_the_task_un
     assert "no plan that meets it was found" in str(outcome.forgone[-1])
     hard = confab.load(heavy).plan(goal="glass IN shop").outcome
     assert hard.status is Status.UNSOLVABLE
+
+
+def test_soft_goals_that_are_known_to_exclude_each_other_are_not_searched_again(tmp_path: Path) -> None:
+    problem, outcomes = confab.load(written(tmp_path, "d:weight 2.0", "d:weight 200.0")).problem, list[Outcome]()
+
+    def search(task: Problem) -> Outcome:
+        for unsolvable in (found.certificate for found in outcomes if found.certificate is not None):
+            assert not {(fact.symbol, fact.value) for fact in unsolvable.unmet} <= task.goal.items()
+        outcomes.append(default(task))
+        return outcomes[-1]
+
+    preferred(problem, search, default)
+    assert any(found.status is Status.UNSOLVABLE for found in outcomes)
+
+
+def test_the_search_of_a_choice_of_soft_goals_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = list[Request]()
+
+    def recorded(request: Request) -> Outcome:
+        asked.append(request)
+        return solve(request)
+
+    monkeypatch.setattr("confab.plan_call.solve", recorded)
+    shop = confab.load("wishes-small")
+    wishes = shop.problem.weights.keys()
+    result = shop.plan(engine="none")
+    assert result.outcome.status is Status.SOLVED
+    assert any(one.problem.goal.keys() & wishes for one in asked)
+    for one in asked[:-1]:  # the last search is for the plan of the result
+        assert bool(one.problem.goal.keys() & wishes) == (one.limits.work <= CHOICE_WORK)
 
 
 def test_the_choice_of_soft_goals_is_kept_if_its_proof_gives_up() -> None:
