@@ -15,7 +15,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from confab.planner.hierarchical.call import Call, settle
 from confab.planner.hierarchical.operators import Achiever
@@ -27,20 +26,12 @@ from confab.planner.hierarchical.search_budget import (
     ONE_STEP,
     PART,
     WHOLE,
-    WIDER,
     SearchBudget,
     scopes,
 )
-from confab.planner.hierarchical.unsolvability import FIRST_TESTS, PAIRS, TEST, impossible, looked_at, proved
-from confab.planner.plan import Reason
+from confab.planner.hierarchical.unsolvability import Proofs
 from confab.planner.transitions import Cell, arguments_of
 from confab.reasoner.symbols import Condition
-
-if TYPE_CHECKING:
-    from confab.planner.grounded.task import Task
-
-FEW = 1_000
-"""The lowest level is tested for unsolvability when the searches have cost as much as examining this number of its states."""
 
 
 @dataclass
@@ -55,38 +46,33 @@ class Agenda:
         levels may be used.
     quickly : bool
         Whether the agenda tries only relevant steps and small scopes.
-    solvable : bool
-        Whether the problem is known to be solvable; the agenda then attempts no proof of unsolvability.
-    forward : bool
-        Whether applied steps are final; the agenda then never restarts from the initial state.
+    trial : bool
+        Whether applied steps are final, and a failure proves nothing. Otherwise, the agenda may restart from the initial state, and
+        attempts to prove that there is no plan.
     """
 
     call: Call
     levels: tuple[int, ...] | None = None
     quickly: bool = False
-    solvable: bool = False
-    forward: bool = False
+    trial: bool = False
     _open: deque[Cell] = field(default_factory=deque)
     _asleep: dict[Cell, None] = field(default_factory=dict)
     _waiting: dict[Cell, list[Cell]] = field(default_factory=dict)
     _before: Mapping[Cell, Sequence[Cell]] = field(default_factory=dict)
-    _lowest: Task | Reason | None = None
-    _looked: int = 0
-    _tested: int = 1
     _tried: dict[int, int] = field(default_factory=dict)
+    _restarted: bool = False
 
-    @property
-    def too_large(self) -> Reason | None:
-        """The reason why grounding of the lowest level failed, or None before such a failure."""
-        return self._lowest if isinstance(self._lowest, Reason) else None
+    def __post_init__(self) -> None:
+        """Attach the proofs to the searches, unless the agenda is a trial."""
+        self.proofs = Proofs(self.call, wanted=not self.trial)
 
     # ------------------------------------------------------------------------------------------------- one goal after another
 
     def achieve_all(self) -> bool:
         """Achieve the goals one after another, with larger search budgets for blocked goals; return whether all goals hold."""
         call = self.call
-        if not self.solvable:
-            call.space.dead_end_check = self.check_unsolvable
+        if not self.trial:
+            call.space.dead_end_check = self.proofs.check
         self.begin()
         while self._open or self._asleep:
             mark = len(call.table.trail)
@@ -110,7 +96,7 @@ class Agenda:
                 for cell in there:
                     del self._asleep[cell]
                     call.kept[cell] = call.goal[cell]
-        self.solvable = True
+        self.proofs.wanted = False
         return True
 
     def begin(self) -> None:
@@ -171,9 +157,8 @@ class Agenda:
     def harder(self) -> bool:
         """Achieve a sleeping goal with a larger budget, or on a lower level; return whether that succeeded."""
         call = self.call
-        if not self.solvable:
-            self._certify()
-            self.check_unsolvable()
+        self.proofs.certify()
+        self.proofs.check()
         if call.advice is not None and self.singly(call.program.levels[0], BY_RULES):
             return True
         for level in call.program.levels:
@@ -184,8 +169,8 @@ class Agenda:
                 continue
             if self.restart(level) or self.singly(level, large) or self.all_goals(level):
                 return True
-            if not self.solvable and self.allowed(level):
-                self._prove()
+            if self.allowed(level):
+                self.proofs.attempt()
         if call.progressed:  # the state has changed since some attempts failed
             call.failed.clear()
             call.progressed = False
@@ -210,8 +195,8 @@ class Agenda:
             if call.achieve(level, cell, *budgets):
                 return True
             call.failed.setdefault(cell, set()).add((level, *budgets))
-            if not budgets[0].steps and not self.solvable:
-                self._prove()
+            if not budgets[0].steps:
+                self.proofs.attempt()
         return False
 
     def _ready(self) -> Iterator[Cell]:
@@ -259,9 +244,9 @@ class Agenda:
         sees. Otherwise a goal could become unreachable without a visible change on an upper level.
         """
         call, refiner = self.call, self.call.refiner
-        if not call.steps or self.forward or level != call.program.levels[0]:
+        if not call.steps or self.trial or self._restarted or level != call.program.levels[0]:
             return False
-        self.forward = True
+        self._restarted = True
         steps, given_up, kept = call.steps, call.given_up, call.kept
         call.replace_steps(())
         call.steps, call.given_up = [], []
@@ -291,52 +276,8 @@ class Agenda:
         open_ = {c: v for c, v in call.goal.items() if not call.met(c) and call.space.visible(level, c)}
         if not open_ or call.reach(level, open_, PART):
             return bool(open_)
-        if not self.solvable:
-            self._certify(WHOLE.work)
+        self.proofs.certify(WHOLE.work)
         return call.reach(level, open_, WHOLE)
-
-    # ------------------------------------------------------------------------------------------------------------ proofs
-
-    def check_unsolvable(self) -> None:
-        """Raise `UnsolvableError` if a test proves that there is no plan; the test costs about as much as the searches so far."""
-        call = self.call
-        if not self.solvable:
-            if call.space.effort >= TEST * FIRST_TESTS:
-                self._certify()
-            if FEW * call.program.size(call.program.levels[-1]) <= call.space.effort:
-                self._examine()
-
-    def _prove(self) -> None:
-        """Raise `UnsolvableError` if a certificate or the grounded lowest level proves that there is no plan."""
-        self._certify()
-        self._examine()
-
-    def _certify(self, ahead: int = 0) -> None:
-        """Search for a certificate of unsolvability, and raise `UnsolvableError` if a certificate is found.
-
-        The search is repeated each time that the effort has doubled, up to a limit. `ahead` is the work of the next search.
-        """
-        call = self.call
-        tests = max(FIRST_TESTS, min(max(call.space.effort, ahead) // TEST, PAIRS))
-        if self._tested < tests >= min(2 * self._tested, PAIRS) and not self._expects_a_plan():
-            self._tested = tests
-            if proof := impossible(call.problem, tests, call.space.deadline):
-                raise proof
-
-    def _examine(self) -> None:
-        """Raise `UnsolvableError` if delete relaxation or exhaustive search of the lowest level proves that there is no plan."""
-        call = self.call
-        if self._expects_a_plan():
-            return
-        if self._lowest is None:
-            self._lowest = proved(call.problem, call.program.levels[-1], call.space.deadline)
-        if not isinstance(self._lowest, Reason):
-            self._looked = looked_at(self._lowest, call.space, self._looked)
-
-    def _expects_a_plan(self) -> bool:
-        """Return whether advice promises a plan, and the searches so far have cost less work than one search of a scope."""
-        advice = self.call.advice
-        return advice is not None and advice.expects and self.call.space.worked < WIDER.work
 
 
 # ------------------------------------------------------------------------------------------------------- order of goals

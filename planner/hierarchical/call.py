@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -13,7 +13,7 @@ from confab.planner.hierarchical.methods import Ranked
 from confab.planner.hierarchical.operators import Program
 from confab.planner.hierarchical.refinement import Advice, RefinedStep, Refiner
 from confab.planner.hierarchical.search_budget import REFINING, SearchBudget
-from confab.planner.hierarchical.workspace import Workspace
+from confab.planner.hierarchical.workspace import Keep, Workspace
 from confab.planner.plan import Outcome, Plan, Reason, Status, Step
 from confab.planner.transitions import Cell, Table, arguments_of, key_of
 from confab.reasoner.amounts import meets
@@ -108,35 +108,48 @@ class Call:
         """Apply refined steps of a level so that the targets and all achieved goals hold; return whether that succeeded."""
         first = self.program.levels[0]
         self.aim, self.refiner.at = targets, None
-        kept: Mapping[Cell, str] = self.kept
-        if level == first and self.unseen:  # steps of a level needn't keep symbols that the level doesn't see
-            kept = {cell: value for cell, value in kept.items() if cell not in self.unseen}
-        keep = self.space.keeping(kept)
-        last = self.steps[-1] if self.unseen.issuperset(targets) and self.steps else None
-        inside = last is not None and last.level == first and last.steps[0].level == level
-        if inside:
-            above, visible = self.space.refining(first), self.space.visible
-
-            def keep(cell: Cell, value: str) -> str | None:
-                # An amount must keep the value of the step, even if a goal only bounds the amount.
-                return above(cell, value) if visible(first, cell) else kept.get(cell) or above(cell, value)
-
+        last = self._last_step(level, targets)
+        keep = self._keeping(level) if last is None else self._keeping_in_last_step()
         steps = self.refiner.achieve(level, targets, keep, budgets)
         if steps is None:
             return False
-        if inside and last is not None:
-            self.steps[-1] = last._replace(steps=(*last.steps, *steps))
-        else:
-            self.steps.extend(steps)
         self.progressed = True
         self.kept.update(targets)
-        if level != first and not inside:
+        if last is not None:
+            self.steps[-1] = last._replace(steps=(*last.steps, *steps))
+            return True
+        self.steps.extend(steps)
+        if level != first:
             goals = ", ".join(str(Fact(Symbol(c[0], arguments_of(c[1])), v)) for c, v in targets.items())
             self.given_up.append(
                 f"level {first} was given up for {goals}: no steps of it were found that can be refined; "
                 f"steps of level {level} replace them"
             )
         return True
+
+    def _last_step(self, level: int, targets: dict[Cell, str]) -> RefinedStep | None:
+        """Return the last step if its refinement by steps of a level may achieve goals that the most abstract level doesn't see."""
+        if not self.steps or not self.unseen.issuperset(targets):
+            return None
+        last = self.steps[-1]
+        return last if last.level == self.program.levels[0] and last.steps[0].level == level else None
+
+    def _keeping(self, level: int) -> Keep:
+        """Return the function `keep` for steps of a level: they keep the achieved goals that the level sees."""
+        if level == self.program.levels[0] and self.unseen:
+            return self.space.keeping({c: value for c, value in self.kept.items() if c not in self.unseen})
+        return self.space.keeping(self.kept)
+
+    def _keeping_in_last_step(self) -> Keep:
+        """Return the function `keep` for additional steps in the refinement of the last step.
+
+        An amount must keep the value that the step gives it, even if a goal only bounds the amount.
+        """
+        first, visible = self.program.levels[0], self.space.visible
+        above = self.space.refining(first)
+        return lambda cell, value: (
+            above(cell, value) if visible(first, cell) else self.kept.get(cell) or above(cell, value)
+        )
 
     def met(self, cell: Cell) -> bool:
         """Return whether a goal holds in the current state."""

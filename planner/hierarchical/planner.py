@@ -145,10 +145,10 @@ def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool) -> Outcome:
             f"level{'s' * (len(upper) > 1)} {', '.join(map(str, upper))} "
             f"{'were' if len(upper) > 1 else 'was'} given up for the whole task"
         )
-    if agenda.too_large is None:
+    if agenda.proofs.too_large is None:
         flat = lowest_alone(call, limits, BITS * limits.work)
     else:
-        flat = step_by_step(call, limits, f"planning goal by goal found no plan, and {agenda.too_large.text}")
+        flat = step_by_step(call, limits, f"planning goal by goal found no plan, and {agenda.proofs.too_large.text}")
     if flat.status is Status.GAVE_UP and flat.reason is not None:
         return given_up(call, flat.reason.text)
     plans = () if flat.plan is None else regroupings(problem, flat.plan, lowest, call.using)
@@ -183,7 +183,7 @@ def given_up(call: Call, why: str) -> Outcome:
 
 def by_rules_alone(call: Call) -> bool:
     """Achieve all goals by learned rules if there are rules for all goals; return whether that succeeded."""
-    return call.advice is not None and call.advice.expects and Agenda(call, (), solvable=True).achieve_all()
+    return call.advice is not None and call.advice.expects and Agenda(call, (), trial=True).achieve_all()
 
 
 def flat_first(problem: Problem, limits: Limits, deadline: float | None) -> Outcome:

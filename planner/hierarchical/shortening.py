@@ -161,7 +161,7 @@ def reordered(call: Call, work: int, advised: Callable[[Call], None], random: Ra
         other.space.most_work = work
         advised(other)
         other.advice = None
-        agenda = Agenda(other, levels=call.program.levels[:1], quickly=True, solvable=True, forward=True)
+        agenda = Agenda(other, levels=call.program.levels[:1], quickly=True, trial=True)
         with suppress(LimitError):
             if agenda.achieve_all() and cost(other) <= cost(call):
                 order[:] = other.kept

@@ -7,11 +7,13 @@ steps. A successful test stops planning. `confab.planner.solve` requires a certi
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from time import perf_counter
 from typing import TYPE_CHECKING
 
+from confab.planner.hierarchical.call import Call
 from confab.planner.hierarchical.scope import LEAST
-from confab.planner.hierarchical.workspace import Workspace
+from confab.planner.hierarchical.search_budget import WIDER
 from confab.planner.plan import OUT_OF_MEMORY, Reason, UngroundableError, UnsolvableError
 from confab.reasoner.limits import within
 from confab.reasoner.symbols import Fact, Problem, State
@@ -29,9 +31,78 @@ The first limit holds before a search, the second in the paper's mode, and the t
 """
 TEST = 8
 """Work of testing one condition, in the unit of `Workspace.effort`."""
+FEW = 1_000
+"""The lowest level is examined when the searches have cost as much as examining this number of its states."""
 MOST_ROWS, MOST_CHANGES = 2_000_000, 10_000_000
 """Maximum number of rows of a join of relaxed reachability (about 200 MB), and maximum number of changes of a grounded level
 (about 600 MB)."""
+
+
+@dataclass
+class Proofs:
+    """Attempts to prove that a call's problem has no plan; the attempts so far cost about as much as the searches so far.
+
+    If a proof isn't `wanted`, no attempt is made.
+    """
+
+    call: Call
+    wanted: bool = True
+    _lowest: Task | Reason | None = None
+    _tests: int = 1
+    _states: int = 0
+
+    @property
+    def too_large(self) -> Reason | None:
+        """The reason why grounding of the lowest level failed, or None before such a failure."""
+        return self._lowest if isinstance(self._lowest, Reason) else None
+
+    def attempt(self) -> None:
+        """Raise `UnsolvableError` if a certificate or the grounded lowest level proves that there is no plan."""
+        self.certify()
+        self.examine()
+
+    def check(self) -> None:
+        """Make those attempts that cost at most as much as the searches so far."""
+        space, program = self.call.space, self.call.program
+        if space.effort >= TEST * FIRST_TESTS:
+            self.certify()
+        if space.effort >= FEW * program.size(program.levels[-1]):
+            self.examine()
+
+    def certify(self, ahead: int = 0) -> None:
+        """Search for a certificate, and raise `UnsolvableError` if a certificate is found.
+
+        The search is repeated each time that the effort has doubled, up to a limit. `ahead` is the work of the next search.
+        """
+        space = self.call.space
+        tests = max(FIRST_TESTS, min(max(space.effort, ahead) // TEST, PAIRS))
+        if self._tests < tests >= min(2 * self._tests, PAIRS) and self._may_succeed():
+            self._tests = tests
+            if proof := impossible(self.call.problem, tests, space.deadline):
+                raise proof
+
+    def examine(self) -> None:
+        """Raise `UnsolvableError` if delete relaxation or exhaustive search of the lowest level proves that there is no plan.
+
+        The exhaustive search is repeated each time that the work of the searches suffices for twice as many states.
+        """
+        space, program = self.call.space, self.call.program
+        if not self._may_succeed():
+            return
+        if self._lowest is None:
+            self._lowest = proved(self.call.problem, program.levels[-1], space.deadline)
+        if isinstance(self._lowest, Reason):
+            return
+        states = max(LOOKING, space.worked) // max(len(self._lowest.owners), LEAST)
+        if states >= 2 * self._states:
+            self._states = states
+            if reason := exhausted(self._lowest, states, space.deadline):
+                raise UnsolvableError(reason)
+
+    def _may_succeed(self) -> bool:
+        """Return whether a proof is wanted, and no advice promises a plan after little work."""
+        advice, worked = self.call.advice, self.call.space.worked
+        return self.wanted and not (advice is not None and advice.expects and worked < WIDER.work)
 
 
 def impossible(problem: Problem, most: int = AT_ONCE, deadline: float | None = None) -> UnsolvableError | None:
@@ -105,21 +176,6 @@ def proved(problem: Problem, level: int, deadline: float | None = None) -> Task 
     if isinstance(task, Reason):
         raise UnsolvableError(task)
     return task
-
-
-def looked_at(task: Task, space: Workspace, before: int) -> int:
-    """Raise `UnsolvableError` if no reachable state satisfies the goal; return the number of examined states.
-
-    The work is limited to the work of the searches so far. If this work doesn't suffice for twice `before` states, the function
-    examines no states and returns `before`.
-    """
-    state = max(len(task.owners), LEAST)
-    most = max(LOOKING, space.worked) // state
-    if most < 2 * before:
-        return before
-    if reason := exhausted(task, most, space.deadline):
-        raise UnsolvableError(reason)
-    return most
 
 
 def exhausted(task: Task, most: int, deadline: float | None = None) -> Reason | None:

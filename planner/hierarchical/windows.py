@@ -45,7 +45,7 @@ def windowed(call: Call, level: int, work: int) -> None:
             return
         other.steps.append(step)
     if not all(map(other.met, other.goal)):  # goals that the level doesn't see are open
-        Agenda(other, call.program.levels[:1], quickly=True, solvable=True, forward=True).achieve_all()
+        Agenda(other, call.program.levels[:1], quickly=True, trial=True).achieve_all()
     problem, old = call.problem, call.tree()
     for plan in regroupings(problem, other.tree(), level, call.using):
         if improves(problem, plan, old, level) and not validate(problem, plan):

@@ -12,7 +12,7 @@ from confab.planner.grounded.task import Task
 from confab.planner.hierarchical.planner import Call, compiled
 from confab.planner.hierarchical.planner import plan as default
 from confab.planner.hierarchical.scope import LEAST
-from confab.planner.hierarchical.unsolvability import exhausted, looked_at
+from confab.planner.hierarchical.unsolvability import Proofs, exhausted
 from confab.planner.levels import levels_left
 from confab.planner.paper.hierarchy import DOUBT
 from confab.planner.paper.hierarchy import plan as paper
@@ -189,14 +189,11 @@ def test_the_number_of_examined_states_grows_with_the_work_of_the_searches() -> 
             f"(define (problem p) (:domain lamps) (:objects {lamps} - lamp) (:init (even)) (:goal (and (odd) (even))))",
         )
     ).problem
-    task = ground(problem)
-    assert isinstance(task, Task)
-    segments = Call(problem, compiled(problem), None, 1).space
-    most = looked_at(task, segments, 0)
-    assert looked_at(task, segments, most) == most  # the examination isn't repeated for fewer than twice as many states
-    segments.worked = 20_000 * LEAST
+    proofs = Proofs(Call(problem, compiled(problem), None, 1))
+    proofs.examine()  # the states are too many for a proof
+    proofs.call.space.worked = 20_000 * LEAST
     with pytest.raises(UnsolvableError, match="none of all"):
-        looked_at(task, segments, most)
+        proofs.examine()
 
 
 def test_a_shorter_order_of_goals_also_achieves_the_goals_that_level_1_does_not_see() -> None:

@@ -12,8 +12,8 @@ from confab.planner.grounded.grounding import ground
 from confab.planner.grounded.task import Task
 from confab.planner.hierarchical.planner import Call, compiled
 from confab.planner.hierarchical.scope import LEAST
-from confab.planner.hierarchical.unsolvability import LOOKING, closed, exhausted, impossible, looked_at, proved, refusal
-from confab.planner.plan import OUT_OF_MEMORY, Reason, UnsolvableError
+from confab.planner.hierarchical.unsolvability import LOOKING, Proofs, closed, exhausted, impossible, proved, refusal
+from confab.planner.plan import OUT_OF_MEMORY, Reason
 from confab.reasoner.amounts import Quantity
 from confab.reasoner.symbols import (
     FALSE,
@@ -396,7 +396,7 @@ def test_a_level_for_which_memory_runs_out_proves_nothing(monkeypatch: pytest.Mo
     assert proved(kitchen({"AT cup1": "sink"}), 1) == OUT_OF_MEMORY
 
 
-def test_states_are_examined_only_within_bounds_and_not_repeatedly() -> None:
+def test_states_are_examined_only_within_bounds_and_not_repeatedly(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = kitchen({"AT cup1": "sink", "CLEAN cup1": TRUE, "DRY cup2": TRUE, "AT cup2": "shelf"})
     task = ground(problem, 1)
     assert isinstance(task, Task)
@@ -406,15 +406,16 @@ def test_states_are_examined_only_within_bounds_and_not_repeatedly() -> None:
     assert found.text == "none of all 54 states of level 1 that can be reached fulfils the goal"
     assert exhausted(impossible_goal, 53) is None
     assert exhausted(impossible_goal, 54) == found
-    segments = Call(problem, compiled(problem), None, 1).space
-    with pytest.raises(UnsolvableError, match="none of all 54 states"):
-        looked_at(impossible_goal, segments, 0)
+    examined: list[int] = []
+    monkeypatch.setattr(
+        "confab.planner.hierarchical.unsolvability.exhausted", lambda _, states, __: examined.append(states)
+    )
+    proofs = Proofs(Call(problem, compiled(problem), None, 1))
+    for work in (0, LOOKING, LOOKING * 3 // 2, 2 * LOOKING, 3 * LOOKING):
+        proofs.call.space.worked = work
+        proofs.examine()
     most = LOOKING // max(len(task.owners), LEAST)
-    assert looked_at(task, segments, 0) == looked_at(task, segments, most // 2) == most
-    assert looked_at(task, segments, most // 2 + 1) == most // 2 + 1
-    assert looked_at(impossible_goal, segments, most) == most
-    segments.worked = 2 * LOOKING
-    assert looked_at(task, segments, most) == 2 * most
+    assert examined == [most, 2 * most]
 
 
 # ------------------------------------------------------------------------------------------------------ random worlds
