@@ -6,9 +6,10 @@ import math
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict
 
 from confab.accepting import AnyPlan, Facts, check_goal, check_seconds, number, plan_of, possible, several
 from confab.formats import EpisodeJson, SeenJson
@@ -21,6 +22,8 @@ from confab.planner.acting.symbolic_world import SymbolicWorld, place_symbols
 from confab.planner.acting.world import World
 from confab.planner.plan import Plan, Planner, Step, renumbered
 from confab.planner.solve import DEFAULT_MODE, Mode
+from confab.planner.validation import open_goals
+from confab.reasoner.amounts import written
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import within
 from confab.reasoner.memory.links import Links
@@ -304,6 +307,14 @@ def _situated(symbol: Symbol, value: str | None, seconds: float) -> SeenJson:
 # -------------------------------------------------------------------------------------------------------------- public functions
 
 
+class SoftGoal(NamedTuple):
+    """A soft goal of an executed task, with its weight, and whether the goal held in the end."""
+
+    fact: Fact
+    weight: Fraction
+    met: bool
+
+
 @right_names("an execution", "scene.execute() or scene.read_episode(FILE)")
 @dataclass(frozen=True)
 class Execution(metaclass=RightNames):
@@ -322,9 +333,21 @@ class Execution(metaclass=RightNames):
         """Whether the execution reached all goals."""
         return self.episode.status is End.REACHED
 
+    @property
+    def soft_goals(self) -> tuple[SoftGoal, ...]:
+        """The soft goals of the task, the heaviest first; a goal that an intervention or `goals` replaced isn't among them."""
+        problem, episode = self.scene.problem, self.episode
+        soft = {s: v for s, v in problem.goal.items() if s in problem.weights and episode.goal.get(s, v) == v}
+        unmet = {fact.symbol for fact in open_goals(replace(problem, initial=episode.observed, goal=soft))}
+        found = [SoftGoal(Fact(s, value), problem.weights[s], s not in unmet) for s, value in soft.items()]
+        return tuple(sorted(found, key=lambda one: (-one.weight, one.fact.symbol)))
+
     def json(self) -> EpisodeJson:
         """Return the episode as JSON data (docs/execution.md)."""
-        return episode_json(self.episode)
+        data = episode_json(self.episode)
+        if soft := self.soft_goals:
+            data["soft_goals"] = [{"goal": str(one.fact), "weight": float(one.weight), "met": one.met} for one in soft]
+        return data
 
     def notes(self) -> dict[tuple[int, ...], str]:
         """Return remarks on steps by the step's path: failures, unexpected values, and changes of the plan."""
@@ -352,6 +375,10 @@ class Execution(metaclass=RightNames):
         ):
             text += (
                 f", {count} {word if count == 1 else word.replace('change', 'changes') + 's' * ('change' not in word)}"
+            )
+        for met, what in ((True, "soft goal reached"), (False, "soft goal left unmet")):
+            text += "".join(
+                f"; {what}: {one.fact} (weight {written(one.weight)})" for one in self.soft_goals if one.met is met
             )
         text += "".join(f"; seen: {found.text}" for found, _ in episode.discovered if found.text)
         text += "".join(f"; {reason.text}" for reason in episode.reasons)

@@ -199,9 +199,15 @@ class SeenJson(TypedDict):
     value: str | None
 
 
-class EpisodeJson(TypedDict):
-    """The record of the execution of a task."""
+class SoftGoalJson(TypedDict):
+    """A soft goal, and whether it held at the end of an execution."""
 
+    goal: str
+    weight: float
+    met: bool
+
+
+class _Episode(TypedDict):
     scene: str
     status: str
     reasons: list[ReasonJson]
@@ -219,6 +225,12 @@ class EpisodeJson(TypedDict):
     course: list[SeenJson]
     seconds: dict[str, float]
     measured: bool
+
+
+class EpisodeJson(_Episode, total=False):
+    """The record of the execution of a task; `soft_goals` is present if the task has soft goals."""
+
+    soft_goals: list[SoftGoalJson]
 
 
 class BecauseJson(TypedDict):

@@ -26,7 +26,7 @@ from confab.reasoner.memory.links import Links
 from confab.reasoner.names import RightNames, right_names
 from confab.reasoner.reading.goals import with_goals
 from confab.reasoner.reading.problem import Reading
-from confab.reasoner.symbols import Problem
+from confab.reasoner.symbols import Fact, Problem
 from confab.timing import (
     Minimise,
     lanes,
@@ -365,8 +365,10 @@ class Result(metaclass=RightNames):
                 return self.in_whole_scene().why_not(asked, instead)
             labels = self.labels
             place = None if instead is None else find_step(self.plan, instead, labels)
+            task = with_goals(self.scene.problem, self.goals)
+            soft = {Fact(symbol, task.goal[symbol]): weight for symbol, weight in task.weights.items()}
             try:
-                told = why_not(asked, self.problem, self.plan, labels, ask, replan, place)
+                told = why_not(asked, self.problem, self.plan, labels, ask, replan, place, soft)
             except KnowledgeError:  # possibly only the whole scene has an individual of the text
                 if self.part is None:
                     raise

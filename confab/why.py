@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from typing import TYPE_CHECKING, TypeAlias
 
 from confab.formats import AccountJson, BecauseJson, WhyNotJson
@@ -17,6 +18,7 @@ from confab.planner.finding import numbers as numbered
 from confab.planner.levels import levels_left
 from confab.planner.plan import Outcome, Plan, Status, Step
 from confab.planner.plan_costs import cost_of
+from confab.reasoner.amounts import written
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import check
 from confab.reasoner.names import known_as, nearest
@@ -343,7 +345,14 @@ def _instead(changes: Sequence[FactChange], labels: Labels) -> str:
 
 
 def why_not(
-    asked: str, problem: Problem, plan: Plan, labels: Labels, ask: Ask, replan: Replan, instead: Step | None = None
+    asked: str,
+    problem: Problem,
+    plan: Plan,
+    labels: Labels,
+    ask: Ask,
+    replan: Replan,
+    instead: Step | None = None,
+    soft: Mapping[Fact, Fraction] | None = None,
 ) -> WhyNot:
     """Return why an alternative isn't in the plan.
 
@@ -361,6 +370,8 @@ def why_not(
         Functions that plan: `ask` plans in a given problem, and `replan` plans in the scene for other goals.
     instead : Step, optional
         The step that the behaviour would replace.
+    soft : mapping of Fact to weight, optional
+        The soft goals of the task.
 
     Raises
     ------
@@ -390,7 +401,7 @@ def why_not(
         raise KnowledgeError(
             f"'{asked}' is neither a fact ('{example}', maybe with 'by INDIVIDUAL') nor a behaviour with individuals{hint}"
         )
-    return _fact_told(asked, fact, by[1] if by else None, problem, plan, labels, ask, replan)
+    return _fact_told(asked, fact, by[1] if by else None, problem, plan, labels, ask, replan, soft or {})
 
 
 def _given(problem: Problem, behavior: Behavior, text: str) -> dict[str, str]:
@@ -440,7 +451,15 @@ def _step_told(asked: str, problem: Problem, plan: Plan, labels: Labels, found: 
 
 
 def _fact_told(
-    asked: str, fact: str, by: str | None, problem: Problem, plan: Plan, labels: Labels, ask: Ask, replan: Replan
+    asked: str,
+    fact: str,
+    by: str | None,
+    problem: Problem,
+    plan: Plan,
+    labels: Labels,
+    ask: Ask,
+    replan: Replan,
+    soft: Mapping[Fact, Fraction],
 ) -> WhyNot:
     about, of, *_ = fact.split()
     goals = [
@@ -458,8 +477,10 @@ def _fact_told(
         if problem.goal.get(symbol) != value:
             problem, outcome, labels = replan([*goals, fact])
     words = labels.fact(Fact(symbol, value))
+    weight = soft.get(Fact(symbol, value))
+    kind = "goal" if weight is None else f"soft goal (weight {written(weight)})"
     if by is None and problem.goal.get(symbol) == value and outcome.plan is plan:
-        return WhyNot(asked, f"this is a goal already: {words}", more=0.0)
+        return WhyNot(asked, f"this is a {kind} already: {words}", more=0.0)
     before = cost_of(problem, plan)
     if by is not None:
         if not any(by in members for members in problem.classes.values()):
@@ -475,10 +496,12 @@ def _fact_told(
         cost = None if outcome.plan is None else cost_of(problem, outcome.plan)
         found = Contrast(before, plan=outcome.plan, cost=cost, reason=outcome.reason)
     if found.plan is None:
+        which = "" if weight is None else f"the {kind} "
         return WhyNot(
-            asked, f"no plan achieves that {words}: {found.reason.text if found.reason else 'no reason is known'}"
+            asked,
+            f"no plan achieves {which}that {words}: {found.reason.text if found.reason else 'no reason is known'}",
         )
-    return _planned(asked, f"the goal that {words}", problem, plan, labels, found)
+    return _planned(asked, f"the {kind} that {words}", problem, plan, labels, found)
 
 
 def _planned(asked: str, what: str, problem: Problem, plan: Plan, labels: Labels, found: Contrast) -> WhyNot:

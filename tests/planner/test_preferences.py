@@ -122,9 +122,22 @@ def test_the_command_line_and_json_name_the_unmet_soft_goals() -> None:
 
 
 def test_execution_leaves_the_same_goals_unmet() -> None:
-    done = confab.load("wishes-small").execute()
+    scene = confab.load("wishes-small")
+    done = scene.execute()
     assert done.reached
-    assert len(done.episode.events) == len(confab.load("wishes-small").plan().plan.primitives)
+    assert len(done.episode.events) == len(scene.plan().plan.primitives)
+    assert [(str(goal.fact), goal.met) for goal in done.soft_goals] == [
+        ("store STOCK 0", False),
+        ("glass IN shop", True),
+    ]
+    assert "soft goal reached: glass IN shop (weight 5); soft goal left unmet: store STOCK 0 (weight 8)" in str(done)
+    assert [goal["met"] for goal in done.json()["soft_goals"]] == [False, True]
+
+
+def test_a_question_about_a_soft_goal_is_answered_with_its_weight() -> None:
+    result = confab.load("wishes-small").plan()
+    assert str(result.why_not("glass IN shop")).startswith("this is a soft goal (weight 5) already: ")
+    assert str(result.why_not("store STOCK 0")).startswith("the soft goal (weight 8) that ")
 
 
 @pytest.mark.parametrize("weight", ["0.0", "-1.0"])
