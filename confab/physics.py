@@ -274,9 +274,11 @@ def verify(
     number("seed", seed, "an integer")
     number("noise", noise, "metres, e.g. 0.002")
     check_seconds("time_limit", time_limit)
-    if rollouts < 1:
+    if rollouts < 1 or rollouts != int(rollouts):
         raise KnowledgeError(f"{rollouts} rollouts can't verify a plan; wanted 1 or more")
     video = None if video is None else Path(video)
+    if video is not None and video.suffix not in (".mp4", ".gif"):
+        raise KnowledgeError(f"{video}: a film is MP4 or GIF; wanted a name that ends in .mp4 or .gif")
     steps = plan.primitives
     require_skills(scene, [step.behavior for step in steps])
     try:

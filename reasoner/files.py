@@ -143,6 +143,8 @@ def made_folder(path: str | Path) -> Path:
     The function raises the errors of `check_folder`.
     """
     check_folder(Path(path))
+    if Path(path).exists() and not Path(path).is_dir():
+        raise NotADirectoryError(errno.ENOTDIR, "is a file; wanted a folder", str(path))
     Path(path).parent.mkdir(exist_ok=True)
     Path(path).mkdir(exist_ok=True)
     return Path(path)

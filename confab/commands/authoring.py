@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 import click
@@ -49,10 +50,15 @@ def new(domain: str, folder: Path | None, bodies: bool) -> None:
     from confab import authoring
 
     files = authoring.new_domain(domain, folder, bodies)
-    scene = next(file for file in files if file.stem.endswith("-scene"))
+    scene = quote(str(next(file for file in files if file.stem.endswith("-scene"))))
     then = "run" if bodies else "plan"
     show_result(
-        "\n".join([*map(str, files), f"next: confab validate {scene}; confab {then} {scene}; docs/authoring.md"])
+        "\n".join(
+            [
+                *map(str, files),
+                f"next: confab validate {scene}; confab {then} {scene}; docs/authoring.md",
+            ]
+        )
     )
 
 
@@ -157,7 +163,7 @@ def generate(family: str, out: Path, objects: int, hands: int, clutter: int, see
     from confab.reasoner.generate import write_scene
 
     write_scene(turtle_path(out), family, objects, hands, clutter, seed)
-    told(out, f"a scene of the family {family}; plan in it with: confab plan {out}")
+    told(out, f"a scene of the family {family}; plan in it with: confab plan {quote(str(out))}")
 
 
 @command(epilog=examples("convert"))
@@ -229,13 +235,13 @@ def import_(
 
             path = turtle_path(out)
             count = scene_of_world(source, path) if query is None else scene_of_graph(Path(source), query, path)
-            print(f"{out}: {count} individuals; plan in it with: confab plan {out} --goal FACT")
+            print(f"{out}: {count} individuals; plan in it with: confab plan {quote(str(out))} --goal FACT")
             return
         from confab.pddl_commands import import_pddl
 
         imported = import_pddl(Path(source), problem, turtle_path(out), level)
     behaviors, facts = len(imported.domain.behaviors), len(imported.initial)
-    told(out, f"{behaviors} behaviours, {facts} facts; plan in it with: confab plan {out}")
+    told(out, f"{behaviors} behaviours, {facts} facts; plan in it with: confab plan {quote(str(out))}")
 
 
 @command(epilog=examples("export"))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from contextlib import suppress
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 from confab import ontology
@@ -43,7 +44,7 @@ def warn_of_errors(scene: Scene, deadline: Deadline) -> None:
         errors = quick_errors(scene.knowledge)
     if errors:
         more = f" and {len(errors) - 1} more" if len(errors) > 1 else ""
-        remark(f"'confab validate {path}' finds errors, so the result may be wrong: {errors[0].what}{more}")
+        remark(f"'confab validate {quote(str(path))}' finds errors, so the result may be wrong: {errors[0].what}{more}")
 
 
 def blame_reach(scene: Scene, outcome: Outcome, deadline: Deadline) -> None:

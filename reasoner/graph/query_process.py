@@ -44,6 +44,10 @@ WORDS = re.compile(
     rf"(?P<text>{TEXTS.pattern})|(?<![\w.:-])(?P<prefix>[A-Za-z][\w-]*)?:(?P<name>[A-Za-z_][\w-]*)?", re.DOTALL
 )
 """Pattern of a literal, an IRI, a comment or a prefixed name."""
+UPDATE = re.compile(
+    r"^\s*(PREFIX\s[^\n]*>\s*)*(INSERT|DELETE|WITH|LOAD|CLEAR|CREATE|DROP|COPY|MOVE|ADD)\b", re.IGNORECASE
+)
+"""Pattern for the beginning of a SPARQL update."""
 DECLARED = re.compile(r"\bPREFIX\s+([\w-]*):", re.IGNORECASE)
 LISTS = re.compile(r"expected one of .{80,}", re.DOTALL)
 """Pattern of the list of expected tokens in an error message of the parser."""
@@ -286,6 +290,8 @@ def _checked(graph: KnowledgeGraph, query: str, limits: QueryLimits, found: Answ
 
 def _explained(graph: KnowledgeGraph, query: str, error: str) -> str:
     """Return the error message of a query in one line, with the text at the faulty position or with an unknown prefix."""
+    if UPDATE.search(query):
+        return "it is an update, and a scene is only read; wanted SELECT, ASK, CONSTRUCT or DESCRIBE"
     error = " ".join(LISTS.sub("unexpected", error).split())
     known = {*graph.spoken, *DECLARED.findall(query)}
     if unknown := next(iter(unknown_prefixes(graph, query)), None):

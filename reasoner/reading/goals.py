@@ -80,7 +80,8 @@ def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
     if name not in known and (len(words) < 3 or about not in individuals):
         example = next((f", e.g. '{Fact(*one)}'" for one in chain(problem.goal.items(), problem.initial.items())), "")
         meant = _with_situation(problem, words) or (nearest(name, known) if len(words) > 2 else "")
-        raise KnowledgeError(f"'{fact}' is no fact; wanted 'object SITUATION value'{example}{meant}")
+        wanted = f"wanted 'object SITUATION value'{example}{_not_one_fact(words) or meant}"
+        raise KnowledgeError(f"'{fact}' is no fact; {wanted}")
     if about not in individuals:
         members = problem.classes.get(known[name].arguments[0], ()) if name in known else ()
         hint = f"{name} is of {some_of(members)}" if members else ""
@@ -99,7 +100,8 @@ def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
     if len(rest) != len(situation.arguments):
         many = len(situation.arguments)
         after = "one word" if many == 1 else f"{many} words"
-        raise KnowledgeError(f"'{fact}': {name} needs {after} after it, a value last; got {len(rest) or 'none'}")
+        got = f"got {len(rest) or 'none'}{_not_one_fact(words)}"
+        raise KnowledgeError(f"'{fact}': {name} needs {after} after it, a value last; {got}")
     if situation.quantity is not None:
         if not BOUNDS.fullmatch(rest[-1]):
             raise KnowledgeError(
@@ -121,6 +123,15 @@ def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
     if about not in problem.members(situation.arguments[0]):
         raise KnowledgeError(f"'{fact}': {about} has no {name}, since it is no {situation.arguments[0]}")
     return symbol, rest[-1]
+
+
+def _not_one_fact(words: Sequence[str]) -> str:
+    """Return how to state a negation, or several facts, if a text attempts this in the place of one fact."""
+    if words and words[0].lower() in ("not", "no", "!"):
+        return "; there is no negation: state another value, or false"
+    if any(word.lower() in ("and", "&", "&&") or word[-1] in ",;" for word in words):
+        return "; give each fact by itself"
+    return ""
 
 
 def _with_situation(problem: Problem, words: Sequence[str]) -> str:

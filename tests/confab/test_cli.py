@@ -8,9 +8,11 @@ from io import StringIO
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 from rich.console import Console
 
 from confab import load
+from confab.cli import app
 from confab.commands.given import blame_reach
 from confab.planner.plan import Outcome, Status
 from confab.reasoner.limits import Deadline
@@ -177,3 +179,9 @@ def test_empty_fact_files_and_memories_are_reported(tmp_path: Path) -> None:
     done = confab("plan", "beverage-serving", "--from-observed", "empty.ttl", cwd=tmp_path)
     assert done.returncode == 2
     assert "holds no observed facts" in done.stderr
+
+
+def test_a_command_that_a_message_gives_is_quoted_for_a_shell(tmp_path: Path) -> None:
+    out = tmp_path / "a b.ttl"
+    said = CliRunner().invoke(app, ["generate", "served", "-o", str(out)]).output
+    assert said.rstrip().endswith(f"confab plan '{out}'")

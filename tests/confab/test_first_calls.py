@@ -105,6 +105,11 @@ SAID: dict[str, tuple[Callable[[confab.Scene, confab.Result], object], str]] = {
     "two goals in place": (lambda scene, result: scene.plan(GOAL, "cup1 LOCATION location7"), "goals=["),
     "a timeout": (lambda scene, result: scene.plan(timeout=3), "did you mean 'time_limit'"),  # type: ignore[call-arg]
     "a seed": (lambda scene, result: scene.plan(seed=3), "the same call gives the same result"),  # type: ignore[call-arg]
+    "a negated goal": (lambda scene, result: scene.plan(f"not {GOAL}"), "there is no negation"),
+    "two goals in one text": (lambda scene, result: scene.plan(f"{GOAL} and cup1 LOCATION location7"), "by itself"),
+    "an update": (lambda scene, result: scene.query("PREFIX : <urn:x>\nINSERT DATA { :a :b :c }"), "is only read"),
+    "a film of another format": (lambda scene, result: result.verify(video="film.txt"), "ends in .mp4 or .gif"),
+    "half a rollout": (lambda scene, result: result.verify(rollouts=1.5), "wanted 1 or more"),  # type: ignore[arg-type]
     "bindings of a query": (
         lambda scene, result: scene.query("SELECT ?o { ?o k:location ?l }", initBindings={}),  # type: ignore[call-arg]
         "VALUES ?x",

@@ -117,7 +117,7 @@ def test_a_displayed_query_runs_in_rdflib_without_additional_prefixes(scene: con
         ("SELECT ?o\nWHERE { ?o k:location }", "error at 2:23.*there stands '}'"),
         ("SELECT ?o WHERE { ?o kk:location ?l }", "1:.*no prefix 'kk:' is known"),
         ("SELECT ?o WHERE { ?o a :Behavior } LIMIT x", "error at 1:42"),
-        ("INSERT DATA { :a :b :c }", "not SPARQL 1.1"),
+        ("INSERT DATA { :a :b :c }", "it is an update, and a scene is only read"),
     ],
 )
 def test_a_faulty_query_is_answered_in_one_line_with_the_place(scene: confab.Scene, query: str, said: str) -> None:

@@ -140,3 +140,9 @@ def test_a_writer_gives_up_waiting_after_a_time_limit(tmp_path: Path, monkeypatc
 
 def test_a_name_becomes_part_of_an_iri() -> None:
     assert as_iri_part("my table/ä%") == "my%20table%2Fä%25"
+
+
+def test_a_file_in_the_place_of_a_folder_is_named_as_the_fault(tmp_path: Path) -> None:
+    (tmp_path / "out").touch()
+    with pytest.raises(NotADirectoryError, match="is a file; wanted a folder"):
+        made_folder(tmp_path / "out")
