@@ -28,8 +28,10 @@ from confab.reasoner.validation.case import Case, Fault
 from confab.reasoner.validation.contradictions import dead
 from confab.reasoner.validation.quantities import some
 
+EVERY = "?each"
+"""Name of the variable that stands for the members of a class in a condition (`confab.reasoner.reading.parts`)."""
 EVERY_OTHER = re.compile(r"\?each\d")
-"""Pattern of the names of variables that stand for the members of a class in a condition (`confab.reasoner.reading.parts`)."""
+"""Pattern of the names of variables that stand for the members of another class in a condition."""
 
 
 def undetermined_variables(case: Case) -> Iterator[Fault]:
@@ -106,6 +108,29 @@ def other_kinds_in_when(case: Case) -> Iterator[Fault]:
                         "if the condition is about the changed individual, name the effect's class in the condition, and "
                         f"add a class condition on {kind}",
                     )
+
+
+def every_member_required(case: Case) -> Iterator[Fault]:
+    """Find behaviours that change all members of a class, and have a precondition on all members of the same class."""
+    if case.reading is None:
+        return
+    problem = case.reading.problem
+    for name, behavior in problem.domain.behaviors.items():
+        changed = {argument for effect in behavior.every_effect for argument in effect.arguments}
+        for condition in behavior.preconditions:
+            if not isinstance(condition, Witness) or condition.variable != EVERY or not condition.negated:
+                continue
+            members = problem.members(condition.kind)
+            if len(members) > 1 and members <= changed:
+                yield (
+                    case.reading.names.iri(name),
+                    f"{name} changes all individuals of {condition.kind}, and is applicable only if a condition holds of all of "
+                    "them",
+                    "a class in a precondition, or in the WHERE of the first operation of an update, denotes all of its "
+                    "individuals; only in the condition of an effect it denotes the changed individual",
+                    "if only individuals that satisfy the condition shall change, move the condition to c:when of the effect; "
+                    "in an update, move it with the effect to a further operation after a semicolon",
+                )
 
 
 def unreachable_behaviors(case: Case) -> Iterator[Fault]:

@@ -18,6 +18,7 @@ RULES: dict[str, Callable[[Case], Iterator[Fault]]] = {
     "file-name-and-iri": terms.files_and_iris,
     "undetermined-variable": behaviors.undetermined_variables,
     "other-kind": behaviors.other_kinds_in_when,
+    "every-member-required": behaviors.every_member_required,
     "unreachable": behaviors.unreachable_behaviors,
     "value-gap": behaviors.gaps_of_values,
     "crowded": behaviors.crowded_places,
@@ -40,6 +41,7 @@ WARNINGS = frozenset(
     {
         "axiom-not-watched",
         "crowded",
+        "every-member-required",
         "number-missing",
         "other-kind",
         "product-of-amounts",
