@@ -299,6 +299,11 @@ def proved(certificate: Certificate, labels: Labels) -> tuple[str, ...]:
         cases = f"{certificate.cases} combination{'s' * (certificate.cases != 1)}"
         named = ", ".join(f"“{one}”" for one in about[:MOST_TOLD])
         lines.append(f"of the values of {named}{more}, {cases} {'is' if certificate.cases == 1 else 'are'} reachable")
+    constraints = labels.domain.constraints
+    for symbol in certificate.bounded:
+        constraint = constraints.get(symbol.situation)
+        within = f"always: {labels.about(symbol)} is within its bounds"
+        lines.append(within if constraint is None else f"constraint: {labels.sentence(str(constraint))}")
     goals = " and ".join(labels.fact(fact) for fact in certificate.unmet[:MOST_TOLD])
     never = "these never hold together" if len(certificate.unmet) > 1 else "this never holds"
     return (*lines, f"The goal requires that {goals}; {never}.")

@@ -5,7 +5,7 @@ and conditions are evaluated by `confab.planner.possibilities`. The checker veri
 certificate's set of states. First, the set of states contains the initial state. Second, no behaviour of the lowest
 level leads out of the set of states; the checker expands each case of the certificate with all applicable behaviours.
 Third, the set of states contains no final state. In a final state, the goal holds, and each symbol with a rest value
-has its rest value or its initial value.
+has its rest value or its initial value. A final state violates no constraint, and all derived amounts are within their bounds.
 
 A plan of several levels is a sequence of behaviours of the lowest level that ends in a final state (docs/levels.md).
 """
@@ -20,7 +20,7 @@ from typing import Generic, TypeAlias, TypeVar
 
 from confab.planner.certificates import Certificate
 from confab.planner.checked_conditions import variables
-from confab.planner.possibilities import Lowest, Range, Reading, WorkLimitError
+from confab.planner.possibilities import Beginning, Lowest, Range, Reading, WorkLimitError
 from confab.reasoner.amounts import bounds, number, written
 from confab.reasoner.symbols import FALSE, TRUE, Behavior, Fact, Problem, Symbol
 
@@ -59,6 +59,9 @@ def refusal(problem: Problem, certificate: Certificate, most: float = WORK) -> s
         for fact in certificate.unmet:
             if fact.symbol.situation not in problem.domain.situations or not wanted_in_the_end(problem, fact):
                 return f"{fact} isn't wanted in this task"
+        for symbol in certificate.bounded:
+            if not is_bounded(problem, symbol):
+                return f"{symbol} isn't a derived amount with bounds"
         cases = Cases(Lowest(problem, most), certificate)
         cases.explore()
     except WorkLimitError as error:
@@ -170,6 +173,39 @@ class CaseView:
         return claims.range(symbol)
 
 
+@dataclass
+class FinalView(CaseView):
+    """The values that symbols can have in the final states of a case, in which symbols have their `wanted` values.
+
+    `used` contains the symbols whose wanted values were read.
+    """
+
+    wanted: Mapping[Symbol, str] = field(default_factory=dict)
+    used: set[Symbol] = field(default_factory=set)
+
+    def goal(self, symbol: Symbol) -> str | None:
+        """Return the wanted value of a symbol, or None; record that the symbol was used."""
+        if symbol not in self.wanted:
+            return None
+        self.used.add(symbol)
+        return self.wanted[symbol]
+
+    def may(self, symbol: Symbol, value: str) -> bool:
+        """Return whether a symbol has a value in some final state of the case."""
+        goal = self.goal(symbol)
+        return super().may(symbol, value) if goal is None else goal == value
+
+    def may_not(self, symbol: Symbol, value: str) -> bool:
+        """Return whether a symbol has a value other than the given value in some final state of the case."""
+        goal = self.goal(symbol)
+        return super().may_not(symbol, value) if goal is None else goal != value
+
+    def between(self, symbol: Symbol) -> Range:
+        """Return the range of amounts of a symbol in the final states of the case."""
+        found, goal = super().between(symbol), self.goal(symbol)
+        return found if goal is None else narrowed(found, goal)
+
+
 class Claims:
     """A certificate prepared for queries: positions of distinguished symbols, and bounds of amounts."""
 
@@ -189,13 +225,7 @@ class Claims:
         if symbol not in self._ranges:
             found = self.lowest.allowed(symbol)
             always = self.certificate.always.get(symbol)
-            if always is not None:
-                low, high = found.low, found.high
-                for sign, limit in bounds(always):
-                    low = max(low, limit) if sign in (">=", "=") else low
-                    high = min(high, limit) if sign in ("<=", "=") else high
-                found = Range(low, high)
-            self._ranges[symbol] = found
+            self._ranges[symbol] = found if always is None else narrowed(found, always)
         return self._ranges[symbol]
 
     def broken(self, symbol: Symbol, value: str) -> bool:
@@ -228,6 +258,7 @@ class Cases:
         self.reached: Case | None = None
         self.came_from: dict[Case, tuple[Case, Try | None]] = {}
         self._ends: Decisions[bool] = Decisions()
+        self._bounds: dict[Symbol, Range] = {}
 
     # ---------------------------------------------------------------------------------------------------- beginning
 
@@ -397,14 +428,54 @@ class Cases:
         return bool(last) and not others and not self.claims.broken(symbol, last[-1])
 
     def ends_here(self, case: Case) -> bool:
-        """Return whether the goal and the rest values hold in some state of a case."""
+        """Return whether the goal and the rest values hold in some state of a case that violates no bound."""
         known = self._ends.find(case)
         if known is None:
-            view = CaseView(self.claims, case)
-            reading = Reading(self.lowest, view)
-            known = all(self.met(reading, fact) for fact in self.certificate.unmet)
-            self._ends.learn(case, view.reads, known)
+            view, final = CaseView(self.claims, case), self.final(case)
+            reading, at_the_end = Reading(self.lowest, view), Reading(self.lowest, final)
+            known = (
+                all(self.met(reading, fact) for fact in self.certificate.unmet)
+                and all(self.met(at_the_end, fact) for fact in self.certificate.unmet if fact.symbol not in final.wanted)
+                and all(self.excess(at_the_end, symbol) is None for symbol in self.certificate.bounded)
+            )
+            self._ends.learn(case, (*view.reads, *final.reads), known)
         return known
+
+    def final(self, case: Case) -> FinalView:
+        """Return the view of the states of a case in which the stated goals of the certificate hold."""
+        domain, goal = self.problem.domain, self.problem.goal
+        goals = (fact for fact in self.certificate.unmet if fact.symbol in goal)
+        wanted = {
+            fact.symbol: fact.value
+            for fact in goals
+            if fact.symbol.situation not in domain.rules and fact.symbol.situation not in domain.aggregates
+        }
+        return FinalView(self.claims, case, wanted=wanted)
+
+    def excess(self, reading: Reading, symbol: Symbol) -> tuple[Range, Range] | None:
+        """Return the range of a derived amount and its bounds, if the amount certainly violates the bounds; otherwise None.
+
+        A plan doesn't violate the bounds, but the initial state may violate them, and the amount may stay as it is then. If a
+        constraint is violated by the goals of the certificate themselves, each of these goals is one violation.
+        """
+        domain = self.problem.domain
+        aggregate, quantity = domain.aggregates[symbol.situation], domain.situations[symbol.situation].quantity
+        if symbol not in self._bounds:
+            first = Reading(self.lowest, Beginning(self.lowest)).total(aggregate, symbol.arguments)
+            least = first.low if quantity is None or quantity.least is None else min(quantity.least, first.low)
+            most = first.high if quantity is None or quantity.most is None else max(quantity.most, first.high)
+            self._bounds[symbol] = Range(least, most)
+        allowed, found = self._bounds[symbol], reading.total(aggregate, symbol.arguments)
+        if (constraint := domain.constraints.get(symbol.situation)) is not None:
+            violation = constraint.situation, FALSE if constraint.always else TRUE
+            goals = {
+                fact
+                for fact in self.certificate.unmet
+                if (fact.symbol.situation, fact.value) == violation
+                and self.lowest.exists(fact.symbol.situation, fact.symbol.arguments)
+            }
+            found = Range(max(found.low, len(goals)), found.high)
+        return (found, allowed) if found.low > allowed.high or found.high < allowed.low else None
 
     def met(self, reading: Reading, fact: Fact) -> bool:
         """Return whether a goal or rest value may hold in the final state.
@@ -424,6 +495,29 @@ def wanted_in_the_end(problem: Problem, fact: Fact) -> bool:
         return problem.goal[symbol] == fact.value
     kind = problem.domain.situations[symbol.situation]
     return kind.rest == fact.value and problem.first_level(symbol) <= problem.domain.levels[-1]
+
+
+def is_bounded(problem: Problem, symbol: Symbol) -> bool:
+    """Return whether a symbol is a sum or count whose bounds every plan respects."""
+    aggregate = problem.domain.aggregates.get(symbol.situation)
+    quantity = problem.domain.situations[symbol.situation].quantity if aggregate is not None else None
+    return (
+        aggregate is not None
+        and aggregate.kept
+        and quantity is not None
+        and quantity.bounded
+        and len(symbol.arguments) == len(aggregate.parameters)
+        and all(a in problem.members(p.kind) for a, p in zip(symbol.arguments, aggregate.parameters, strict=True))
+    )
+
+
+def narrowed(found: Range, limits: str) -> Range:
+    """Return the part of a range of amounts that is within limits; the ends count even if the limits exclude them."""
+    low, high = found.low, found.high
+    for sign, limit in bounds(limits):
+        low = max(low, limit) if sign[0] in ">=" else low
+        high = min(high, limit) if sign[0] in "<=" else high
+    return Range(low, high, found.partial)
 
 
 def own_variables(behavior: Behavior) -> frozenset[str]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from confab.planner.certificate_checks import CaseView, Claims, own_variables, unified
+from confab.planner.certificate_checks import Cases, CaseView, Claims, own_variables, unified
 from confab.planner.certificates import Certificate
 from confab.planner.checked_conditions import variables
 from confab.planner.plan import Reason
@@ -85,6 +85,11 @@ def told(problem: Problem, certificate: Certificate) -> Reason:
         has = "doesn't contain" if one else "contains"
         text = f"{what} {how}: {which} of values of {about} {has} {'all of these goals' if many else 'this goal'}"
         return Reason(text, tuple(dict.fromkeys(terms)))
+    if certificate.bounded or len(goals) > 1:
+        why, more = _excluded(problem, certificate)
+        what = " and ".join(map(str, goals)) + " …" * (len(certificate.unmet) > SHOWN)
+        how = f"exclude each other: together they {why}" if len(goals) > 1 else f"can't hold: it would {why}"
+        return Reason(f"{what} {how}", tuple(dict.fromkeys((*terms, *more))))
     try:
         chain, cause = _Causes(problem, certificate).chain()
     except (WorkLimitError, RecursionError):
@@ -101,6 +106,25 @@ def told(problem: Problem, certificate: Certificate) -> Reason:
     terms += [*cause.terms, *(word for claim in follows for word in _words(claim.fact))]
     named = dict.fromkeys(word for word in terms if not word.startswith("?"))
     return Reason(f"{goal} can't be reached: {cause.text}{so}", tuple(named))
+
+
+def _excluded(problem: Problem, certificate: Certificate) -> tuple[str, tuple[str, ...]]:
+    """Return why goals exclude each other in every state, as text that completes "they would", and the terms of the text."""
+    lowest = Lowest(problem)
+    cases = Cases(lowest, certificate)
+    for symbol in certificate.bounded:
+        constraint = problem.domain.constraints.get(symbol.situation)
+        if constraint is not None:
+            return f"violate the constraint that {constraint}", (constraint.situation,)
+        excess = cases.excess(Reading(lowest, cases.final(cases.first() or ())), symbol)
+        if excess is not None:
+            found, allowed = excess
+            over = found.low > allowed.high
+            got, end = (found.low, allowed.high) if over else (found.high, allowed.low)
+            more, most = ("least", "maximum") if over else ("most", "minimum")
+            amounts = f"at {more} {written(Fraction(got))}, and its {most} is {written(Fraction(end))}"
+            return f"make {_named(symbol)} {amounts}", (*symbol.arguments, symbol.situation)
+    return "contradict the definitions of derived facts", ()
 
 
 def _listed(claims: Sequence[Claim]) -> str:

@@ -6,6 +6,9 @@ Three kinds of claims describe the set of states of a certificate. First, some f
 number. A certificate without distinguished values has a single case. If a certificate distinguishes all values, each
 case is a single state.
 
+A certificate can also name derived amounts that are *bounded*. A state with the goals violates these bounds, and no plan
+leads to such a state. The number of violations of a constraint is such an amount.
+
 `confab.planner.certificate_checks` verifies a certificate, `confab.planner.certifying` finds one.
 """
 
@@ -36,6 +39,8 @@ class Certificate:
         Number of reachable combinations of distinguished values; the goal holds in none of these combinations.
     unmet : tuple of Fact
         Goals of which at least one doesn't hold in each case.
+    bounded : tuple of Symbol
+        Derived amounts with bounds that the goals of `unmet` together violate.
     """
 
     never: frozenset[Fact] = frozenset()
@@ -43,12 +48,13 @@ class Certificate:
     told_apart: Mapping[Symbol, tuple[str, ...]] = field(default_factory=dict)
     cases: int = 1
     unmet: tuple[Fact, ...] = ()
+    bounded: tuple[Symbol, ...] = ()
 
     @property
     def kind(self) -> str:
         """The kind of claims in the certificate, as a short text."""
         if not self.told_apart:
-            return "facts"
+            return "bounds" if self.bounded else "facts"
         return "pair" if len(self.told_apart) == 2 and all(map(len, self.told_apart.values())) else "cases"
 
 
@@ -68,6 +74,7 @@ class CertificateJson(TypedDict):
     told_apart: list[ToldApartJson]
     cases: int
     unmet: list[list[str]]
+    bounded: list[list[str]]
 
 
 def certificate_json(certificate: Certificate) -> CertificateJson:
@@ -82,6 +89,7 @@ def certificate_json(certificate: Certificate) -> CertificateJson:
         ],
         "cases": certificate.cases,
         "unmet": [_listed(fact) for fact in certificate.unmet],
+        "bounded": [[symbol.situation, *symbol.arguments] for symbol in certificate.bounded],
     }
 
 
@@ -102,11 +110,11 @@ def certificate_from(data: Any) -> Certificate:
             never=frozenset(map(_fact, data["never"])),
             always={fact.symbol: fact.value for fact in map(_fact, data["always"])},
             told_apart={
-                Symbol(one["symbol"][0], tuple(map(_text, one["symbol"][1:]))): tuple(map(_text, one["values"]))
-                for one in data["told_apart"]
+                _symbol(one["symbol"]): tuple(map(_text, one["values"])) for one in data["told_apart"]
             },
             cases=data["cases"],
             unmet=tuple(map(_fact, data["unmet"])),
+            bounded=tuple(map(_symbol, data.get("bounded", ()))),
         )
     except (KeyError, TypeError, IndexError, AttributeError) as error:
         raise ValueError(
@@ -121,6 +129,11 @@ def _listed(fact: Fact) -> list[str]:
 def _fact(words: Sequence[Any]) -> Fact:
     situation, *arguments, value = map(_text, words)
     return Fact(Symbol(situation, tuple(arguments)), value)
+
+
+def _symbol(words: Sequence[Any]) -> Symbol:
+    situation, *arguments = map(_text, words)
+    return Symbol(situation, tuple(arguments))
 
 
 def _text(word: Any) -> str:

@@ -4,9 +4,12 @@ The first step is relaxed reachability, which determines the facts that can beco
 computation works backwards from the goal, so that only relevant facts are considered. A required fact that isn't reachable
 in the relaxed task never holds.
 
-If the relaxed goal is reachable, the second step distinguishes a few values, at first the values of the goal. Then the cases
+Some goals exclude each other in every state: by the definitions of derived facts, or because a state with all of these goals
+violates a constraint or the bounds of a derived amount. This needs no search.
+
+If the relaxed goal is reachable, the next step distinguishes a few values, at first the values of the goal. Then the cases
 are searched; a case is a combination of the distinguished values. A path through the cases to the goal is executed on the
-original task. If the execution fails, the cases also distinguish the values on which the execution failed. The second step is
+original task. If the execution fails, the cases also distinguish the values on which the execution failed. This step is
 repeated until no path remains (then the task is unsolvable), or until a path succeeds (then there is a plan).
 
 The last step distinguishes all values, so that each case is a state. A choice of distinguished values may have infinitely
@@ -30,6 +33,7 @@ from confab.planner.certificate_checks import (
     Cases,
     CaseView,
     Try,
+    is_bounded,
     own_variables,
     unified,
     wanted_in_the_end,
@@ -59,8 +63,9 @@ Key: TypeAlias = "tuple[str, Symbol, str]"
 """Kinds of questions about reachability: can a symbol get a value (`GETS`), can a symbol lose its value, or an amount
 change (`LEAVES`), can a condition on the final state hold (`ENDS`)?"""
 GETS, LEAVES, ENDS = "gets", "leaves", "ends"
-KINDS = ("facts", "pairs", "cases", "states")
-"""Kinds of certificates: unreachable facts; two goals that exclude each other; distinguished values; all values."""
+KINDS = ("facts", "bounds", "pairs", "cases", "states")
+"""Kinds of certificates: unreachable facts; goals that exclude each other in every state; two goals that exclude each other;
+distinguished values; all values."""
 
 
 def certify(problem: Problem, most: float = WORK, few_states: bool = False) -> Certificate | None:
@@ -79,8 +84,10 @@ def certify(problem: Problem, most: float = WORK, few_states: bool = False) -> C
                 return _with_fewer(lowest, found)
         return (
             _at_once(lowest, LITTLE[0])
+            or _in_every_state(lowest, LITTLE[0])
             or _contested(lowest)
             or _at_once(lowest, LITTLE[1])
+            or _in_every_state(lowest, LITTLE[1])
             or relaxed.certificate(problem.goal)
             or _in_stages(lowest, relaxed)
         )
@@ -99,6 +106,8 @@ def of_kind(kind: str, problem: Problem, most: float = WORK) -> Certificate | No
         match kind:
             case "facts":
                 return relaxed.certificate(problem.goal)
+            case "bounds":
+                return _by_bounds(lowest)
             case "pairs":
                 return _by_pairs(lowest, relaxed)
             case "cases":
@@ -366,6 +375,39 @@ def _in_stages(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
             if (found := _with_little(lowest, min(little, SHARE * (lowest.most - lowest.work)), find)) is not None:
                 return _with_fewer(lowest, found)
     return None
+
+
+def _in_every_state(lowest: Lowest, little: float) -> Certificate | None:
+    """Return a certificate with few goals that exclude each other in every state."""
+    found = _with_little(lowest, little, partial(_by_bounds, lowest))
+    return None if found is None else _with_fewer_goals(lowest, found)
+
+
+def _by_bounds(lowest: Lowest) -> Certificate | None:
+    """Return a certificate that some goals, in any state, contradict definitions or the bounds of derived amounts."""
+    domain, classes = lowest.problem.domain, lowest.problem.classes
+    goals = tuple(Fact(symbol, wanted) for symbol, wanted in sorted(lowest.problem.goal.items()))
+    if any(fact.symbol.situation in domain.rules or fact.symbol.situation in domain.aggregates for fact in goals):
+        if (found := _counted(lowest, Certificate(unmet=goals))) is not None:
+            return found
+    cases = Cases(lowest, Certificate(unmet=goals))
+    for name, aggregate in domain.aggregates.items():
+        violation = domain.constraints[name].situation if name in domain.constraints else None
+        for individuals in product(*(classes.get(p.kind, ()) for p in aggregate.parameters)):
+            symbol, final = Symbol(name, individuals), cases.final(())
+            if is_bounded(lowest.problem, symbol) and cases.excess(Reading(lowest, final), symbol) is not None:
+                used = tuple(f for f in goals if f.symbol in final.used or f.symbol.situation == violation)
+                return Certificate(unmet=used or goals[:1], bounded=(symbol,))
+    return None
+
+
+def _with_fewer_goals(lowest: Lowest, found: Certificate) -> Certificate:
+    """Return a certificate without superfluous goals; each goal is tested with a small work limit."""
+    for fact in found.unmet:
+        fewer = replace(found, unmet=tuple(other for other in found.unmet if other != fact))
+        if fewer.unmet:
+            found = _with_little(lowest, LITTLE[0], partial(_counted, lowest, fewer)) or found
+    return found
 
 
 def _by_pairs(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:

@@ -234,6 +234,26 @@ class Lowest:
         return self._inner[id(aggregate)]
 
 
+@dataclass(frozen=True)
+class Beginning:
+    """The knowledge of the initial state: the value of each symbol."""
+
+    lowest: Lowest
+
+    def may(self, symbol: Symbol, value: str) -> bool:
+        """Return whether a symbol has a value."""
+        return self.lowest.initial(symbol) == value
+
+    def may_not(self, symbol: Symbol, value: str) -> bool:
+        """Return whether a symbol has another value."""
+        return not self.may(symbol, value)
+
+    def between(self, symbol: Symbol) -> Range:
+        """Return the amount of a symbol, as a range."""
+        exactly = number(self.lowest.initial(symbol))
+        return Range(exactly, exactly)
+
+
 class Reading:
     """Evaluation of conditions and effects of the lowest level on a fixed set of states."""
 
