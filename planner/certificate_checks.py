@@ -12,6 +12,7 @@ A plan of several levels is a sequence of behaviours of the lowest level that en
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -435,7 +436,9 @@ class Cases:
             reading, at_the_end = Reading(self.lowest, view), Reading(self.lowest, final)
             known = (
                 all(self.met(reading, fact) for fact in self.certificate.unmet)
-                and all(self.met(at_the_end, fact) for fact in self.certificate.unmet if fact.symbol not in final.wanted)
+                and all(
+                    self.met(at_the_end, fact) for fact in self.certificate.unmet if fact.symbol not in final.wanted
+                )
                 and all(self.excess(at_the_end, symbol) is None for symbol in self.certificate.bounded)
             )
             self._ends.learn(case, (*view.reads, *final.reads), known)
@@ -455,15 +458,15 @@ class Cases:
     def excess(self, reading: Reading, symbol: Symbol) -> tuple[Range, Range] | None:
         """Return the range of a derived amount and its bounds, if the amount certainly violates the bounds; otherwise None.
 
-        A plan doesn't violate the bounds, but the initial state may violate them, and the amount may stay as it is then. If a
-        constraint is violated by the goals of the certificate themselves, each of these goals is one violation.
+        A plan doesn't violate the bounds. If the initial state violates the bounds, the amount may keep its initial value. A goal
+        of the certificate that is itself a violation of a constraint counts as one violation.
         """
         domain = self.problem.domain
         aggregate, quantity = domain.aggregates[symbol.situation], domain.situations[symbol.situation].quantity
         if symbol not in self._bounds:
             first = Reading(self.lowest, Beginning(self.lowest)).total(aggregate, symbol.arguments)
-            least = first.low if quantity is None or quantity.least is None else min(quantity.least, first.low)
-            most = first.high if quantity is None or quantity.most is None else max(quantity.most, first.high)
+            least = -math.inf if quantity is None or quantity.least is None else min(quantity.least, first.low)
+            most = math.inf if quantity is None or quantity.most is None else max(quantity.most, first.high)
             self._bounds[symbol] = Range(least, most)
         allowed, found = self._bounds[symbol], reading.total(aggregate, symbol.arguments)
         if (constraint := domain.constraints.get(symbol.situation)) is not None:

@@ -109,9 +109,7 @@ def certificate_from(data: Any) -> Certificate:
         return Certificate(
             never=frozenset(map(_fact, data["never"])),
             always={fact.symbol: fact.value for fact in map(_fact, data["always"])},
-            told_apart={
-                _symbol(one["symbol"]): tuple(map(_text, one["values"])) for one in data["told_apart"]
-            },
+            told_apart={_symbol(one["symbol"]): tuple(map(_text, one["values"])) for one in data["told_apart"]},
             cases=data["cases"],
             unmet=tuple(map(_fact, data["unmet"])),
             bounded=tuple(map(_symbol, data.get("bounded", ()))),

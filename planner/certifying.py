@@ -83,11 +83,10 @@ def certify(problem: Problem, most: float = WORK, few_states: bool = False) -> C
             if found is not None:
                 return _with_fewer(lowest, found)
         return (
-            _at_once(lowest, LITTLE[0])
-            or _in_every_state(lowest, LITTLE[0])
+            _in_every_state(lowest)
+            or _at_once(lowest, LITTLE[0])
             or _contested(lowest)
             or _at_once(lowest, LITTLE[1])
-            or _in_every_state(lowest, LITTLE[1])
             or relaxed.certificate(problem.goal)
             or _in_stages(lowest, relaxed)
         )
@@ -377,19 +376,23 @@ def _in_stages(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
     return None
 
 
-def _in_every_state(lowest: Lowest, little: float) -> Certificate | None:
+def _in_every_state(lowest: Lowest) -> Certificate | None:
     """Return a certificate with few goals that exclude each other in every state."""
-    found = _with_little(lowest, little, partial(_by_bounds, lowest))
-    return None if found is None else _with_fewer_goals(lowest, found)
+    found = _with_little(lowest, SHARE * lowest.most, partial(_by_bounds, lowest))
+    if found is None:
+        return None
+    lowest.most = lowest.work + FEWER
+    for fact in found.unmet:
+        fewer = replace(found, unmet=tuple(other for other in found.unmet if other != fact))
+        if fewer.unmet:
+            found = _with_little(lowest, LITTLE[1], partial(_counted, lowest, fewer)) or found
+    return found
 
 
 def _by_bounds(lowest: Lowest) -> Certificate | None:
     """Return a certificate that some goals, in any state, contradict definitions or the bounds of derived amounts."""
     domain, classes = lowest.problem.domain, lowest.problem.classes
     goals = tuple(Fact(symbol, wanted) for symbol, wanted in sorted(lowest.problem.goal.items()))
-    if any(fact.symbol.situation in domain.rules or fact.symbol.situation in domain.aggregates for fact in goals):
-        if (found := _counted(lowest, Certificate(unmet=goals))) is not None:
-            return found
     cases = Cases(lowest, Certificate(unmet=goals))
     for name, aggregate in domain.aggregates.items():
         violation = domain.constraints[name].situation if name in domain.constraints else None
@@ -398,16 +401,8 @@ def _by_bounds(lowest: Lowest) -> Certificate | None:
             if is_bounded(lowest.problem, symbol) and cases.excess(Reading(lowest, final), symbol) is not None:
                 used = tuple(f for f in goals if f.symbol in final.used or f.symbol.situation == violation)
                 return Certificate(unmet=used or goals[:1], bounded=(symbol,))
-    return None
-
-
-def _with_fewer_goals(lowest: Lowest, found: Certificate) -> Certificate:
-    """Return a certificate without superfluous goals; each goal is tested with a small work limit."""
-    for fact in found.unmet:
-        fewer = replace(found, unmet=tuple(other for other in found.unmet if other != fact))
-        if fewer.unmet:
-            found = _with_little(lowest, LITTLE[0], partial(_counted, lowest, fewer)) or found
-    return found
+    derived = any(fact.symbol.situation in domain.rules or fact.symbol.situation in domain.aggregates for fact in goals)
+    return _counted(lowest, Certificate(unmet=goals)) if derived else None
 
 
 def _by_pairs(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
@@ -539,7 +534,8 @@ def _refined(cases: Cases, end: Case, relaxed: Relaxed, goal: State) -> Certific
             cases.met(Reading(lowest, view), fact)
             if wrong := _wrong(view, facts):
                 return _told_apart(cases, relaxed, wrong)
-    for fact in open_ or rests:
+    known = {symbol.situation for symbol in cases.certificate.told_apart}
+    for fact in sorted(open_ or rests, key=lambda fact: fact.symbol.situation not in known):
         if fact not in cases.certificate.unmet:
             return replace(cases.certificate, unmet=(*cases.certificate.unmet, fact))
     return None

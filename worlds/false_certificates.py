@@ -44,6 +44,12 @@ def corrupted(problem: Problem, certificate: Certificate, rng: Random) -> Iterat
         for name in OTHERS:
             yield "with another constant", replace(certificate, always={**certificate.always, one: name})
     meant = Interpreter(problem)
+    if certificate.bounded and not (certificate.never or certificate.always or certificate.told_apart):
+        plain = {one: value for one, value in problem.goal.items() if meant.kinds[one.situation].quantity is None}
+        slots = zip(meant.slots, meant.initial, strict=False)
+        end = meant.closed([plain.get(one, value) for one, value in slots])
+        if all(meant.meets(end, fact.symbol, fact.value) for fact in certificate.unmet):
+            yield "without the violated bound", replace(certificate, bounded=())
     for fact in rng.sample(sorted(certificate.never), min(3, len(certificate.never))):
         less = replace(certificate, never=certificate.never - {fact})
         if disproved(meant, less, fact.symbol, [v for v in given(problem, fact.symbol.situation) if v == fact.value]):
