@@ -359,7 +359,7 @@ class Result(metaclass=RightNames):
             other = other.in_whole_scene() if choice else other
             return other.problem, other.outcome, other.labels
 
-        with within(seconds):
+        with within(seconds), paused_collection():
             choice = BY.search(asked) is not None  # perhaps only the whole scene has the individual
             if choice and self.part is not None:
                 return self.in_whole_scene().why_not(asked, instead)

@@ -83,8 +83,9 @@ def certify(problem: Problem, most: float = WORK, few_states: bool = False) -> C
             if found is not None:
                 return _with_fewer(lowest, found)
         return (
-            _in_every_state(lowest)
+            _in_every_state(lowest, _by_bounds)
             or _at_once(lowest, LITTLE[0])
+            or _in_every_state(lowest, _by_definitions)
             or _contested(lowest)
             or _at_once(lowest, LITTLE[1])
             or relaxed.certificate(problem.goal)
@@ -106,7 +107,7 @@ def of_kind(kind: str, problem: Problem, most: float = WORK) -> Certificate | No
             case "facts":
                 return relaxed.certificate(problem.goal)
             case "bounds":
-                return _by_bounds(lowest)
+                return _by_bounds(lowest) or _by_definitions(lowest)
             case "pairs":
                 return _by_pairs(lowest, relaxed)
             case "cases":
@@ -376,9 +377,9 @@ def _in_stages(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
     return None
 
 
-def _in_every_state(lowest: Lowest) -> Certificate | None:
+def _in_every_state(lowest: Lowest, find: Callable[[Lowest], Certificate | None]) -> Certificate | None:
     """Return a certificate with few goals that exclude each other in every state."""
-    found = _with_little(lowest, SHARE * lowest.most, partial(_by_bounds, lowest))
+    found = _with_little(lowest, SHARE * (lowest.most - lowest.work), partial(find, lowest))
     if found is None:
         return None
     lowest.most = lowest.work + FEWER
@@ -390,7 +391,7 @@ def _in_every_state(lowest: Lowest) -> Certificate | None:
 
 
 def _by_bounds(lowest: Lowest) -> Certificate | None:
-    """Return a certificate that some goals, in any state, contradict definitions or the bounds of derived amounts."""
+    """Return a certificate that some goals, in any state, violate a constraint or the bounds of a derived amount."""
     domain, classes = lowest.problem.domain, lowest.problem.classes
     goals = tuple(Fact(symbol, wanted) for symbol, wanted in sorted(lowest.problem.goal.items()))
     cases = Cases(lowest, Certificate(unmet=goals))
@@ -401,7 +402,14 @@ def _by_bounds(lowest: Lowest) -> Certificate | None:
             if is_bounded(lowest.problem, symbol) and cases.excess(Reading(lowest, final), symbol) is not None:
                 used = tuple(f for f in goals if f.symbol in final.used or f.symbol.situation == violation)
                 return Certificate(unmet=used or goals[:1], bounded=(symbol,))
-    derived = any(fact.symbol.situation in domain.rules or fact.symbol.situation in domain.aggregates for fact in goals)
+    return None
+
+
+def _by_definitions(lowest: Lowest) -> Certificate | None:
+    """Return a certificate that some goals, in any state, contradict the definitions of derived facts."""
+    defined = lowest.problem.domain.rules.keys() | lowest.problem.domain.aggregates.keys()
+    goals = tuple(Fact(symbol, wanted) for symbol, wanted in sorted(lowest.problem.goal.items()))
+    derived = any(fact.symbol.situation in defined for fact in goals)
     return _counted(lowest, Certificate(unmet=goals)) if derived else None
 
 

@@ -91,7 +91,9 @@ def read(graph: KnowledgeGraph, schema: Schema | None = None) -> Reading:
 
 def read_names(graph: KnowledgeGraph) -> Names:
     """Return the short names that `read` would give to the terms of a whole scene, without reading facts."""
-    return names_of(read_schema(graph), _members(graph))
+    schema, members = read_schema(graph), _members(graph)
+    check("reading the scene")
+    return names_of(schema, members)
 
 
 def _members(graph: KnowledgeGraph) -> list[Member]:

@@ -18,6 +18,7 @@ from confab.reasoner.amounts import (
 )
 from confab.reasoner.condition_nodes import Node
 from confab.reasoner.graph.knowledge import KnowledgeError, Term, text
+from confab.reasoner.limits import check
 from confab.reasoner.names import Names, local_name
 from confab.reasoner.vocabulary import CORE, OWL, TYPE
 
@@ -110,9 +111,13 @@ class Schema:
 def nodes_of(triples: Iterable[tuple[str, str, str]]) -> dict[str, dict[str, list[str]]]:
     """Return the properties and values of each subject, sorted by subject and value."""
     nodes: dict[str, dict[str, list[str]]] = {}
-    for subject, predicate, value in triples:
+    for count, (subject, predicate, value) in enumerate(triples):
+        if not count % 4096:
+            check("reading the scene")
         nodes.setdefault(subject, {}).setdefault(predicate, []).append(value)
-    for node in nodes.values():
+    for count, node in enumerate(nodes.values()):
+        if not count % 4096:
+            check("reading the scene")
         for values in node.values():
             if len(values) > 1:
                 values.sort()
