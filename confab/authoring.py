@@ -17,7 +17,7 @@ from confab.memory import Memory
 from confab.planner.paper.transitions import ground
 from confab.planner.solve import Mode
 from confab.reasoner.files import STDOUT, alone, made_folder, write_whole
-from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
+from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.memory.experience_file import Lines
 from confab.reasoner.names import local_name, nearest
 from confab.reasoner.vocabulary import ARGUMENTS, CORE
@@ -25,6 +25,7 @@ from confab.show import bindings_of
 from confab.table import Table
 
 if TYPE_CHECKING:
+    from confab.known import Known
     from confab.scene import Scene
 
 PLACEHOLDER = "_DOMAIN_"
@@ -222,7 +223,7 @@ def _lines(scene: Scene, mode: Mode) -> tuple[str, ...]:
 # ------------------------------------------------------------------------------------------------------- memory and renames
 
 
-def unknown_terms(memory: Lines, graph: KnowledgeGraph) -> list[str]:
+def unknown_terms(memory: Lines, scene: Known) -> list[str]:
     """Return the terms of the domain that a memory mentions and the scene doesn't contain.
 
     Each term is mapped to the most similar name in the scene.
@@ -238,9 +239,13 @@ def unknown_terms(memory: Lines, graph: KnowledgeGraph) -> list[str]:
             if isinstance(t.object, ox.NamedNode)
             and (t.predicate.value in TERMS or (t.subject in kinds and t.predicate.value in ROLES))
         }
-    asked = " ".join(str(ox.NamedNode(iri)) for iri in sorted(spoken))
-    rows = graph.select(f"SELECT ?x WHERE {{ VALUES ?x {{ {asked} }} FILTER EXISTS {{ ?x ?p ?o }} }}") if spoken else []
-    unknown = sorted(spoken - {x.value for (x,) in rows if isinstance(x, ox.NamedNode)})
+    graph, made = (
+        scene.knowledge,
+        scene.names.iris,
+    )  # the reader makes situation types, such as "ended" of an at-most-once type
+    asked = " ".join(str(ox.NamedNode(iri)) for iri in sorted(spoken.difference(made)))
+    rows = graph.select(f"SELECT ?x WHERE {{ VALUES ?x {{ {asked} }} FILTER EXISTS {{ ?x ?p ?o }} }}") if asked else []
+    unknown = sorted(spoken.difference(made) - {x.value for (x,) in rows if isinstance(x, ox.NamedNode)})
     names = (
         {local_name(q.subject.value) for q in graph.store if isinstance(q.subject, ox.NamedNode)} if unknown else set()
     )

@@ -82,7 +82,7 @@ def memory_for(path: Path | None, none: bool, scene: Scene, new: bool = False) -
             from confab.reasoner.memory.links_file import memory_lines
 
             lines = memory_lines(path)
-            if unknown := unknown_terms(lines, scene.knowledge):
+            if unknown := unknown_terms(lines, scene):
                 more = f"; and {len(unknown) - NAMED} more" if len(unknown) > NAMED else ""
                 remark(f"{path} has terms that this scene doesn't have: {'; '.join(unknown[:NAMED])}{more}")
         return Memory.load(path, scene, lines=lines)

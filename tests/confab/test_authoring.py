@@ -94,12 +94,12 @@ def memory(tmp_path: Path) -> Path:
 
 
 def test_a_memory_can_be_migrated_to_a_renamed_term(memory: Path) -> None:
-    graph = confab.load(memory.with_name("tearoom-scene.ttl")).knowledge
-    assert unknown_terms(memory_lines(memory), graph) == []
+    scene = confab.load(memory.with_name("tearoom-scene.ttl"))
+    assert unknown_terms(memory_lines(memory), scene) == []
     memory.write_text(memory.read_text().replace("tearoom#CLEANLINESS", "tearoom#CLEANLINES"))
-    assert unknown_terms(memory_lines(memory), graph) == ["CLEANLINES; did you mean 'CLEANLINESS'?"]
+    assert unknown_terms(memory_lines(memory), scene) == ["CLEANLINES; did you mean 'CLEANLINESS'?"]
     assert migrate(memory, ["CLEANLINES=CLEANLINESS"]) > 3
-    assert unknown_terms(memory_lines(memory), graph) == []
+    assert unknown_terms(memory_lines(memory), scene) == []
 
 
 def test_a_rename_changes_the_words_of_learned_facts_and_whole_words_only(memory: Path) -> None:

@@ -64,7 +64,7 @@ def test_a_memory_that_is_edited_without_its_scene_keeps_its_terms(tmp_path: Pat
     confab.Memory.of(scene).save(other)
     for arguments in (["trust", file, "all"], ["merge", file, other, "-o", file]):
         assert CliRunner().invoke(app, ["memory", *map(str, arguments)]).exit_code == 0
-        assert unknown_terms(memory_lines(file), scene.knowledge) == []
+        assert unknown_terms(memory_lines(file), scene) == []
     assert confab.Memory.load(file, scene).experience.said == memory.experience.said
 
 
@@ -182,6 +182,7 @@ def test_a_memory_of_a_world_is_saved_and_read_again(name: str, tmp_path: Path) 
     memory.teach(world, world.plan())
     memory.save(tmp_path / "memory.ttl")
     assert confab.Memory.load(tmp_path / "memory.ttl", world).experience == memory.experience
+    assert unknown_terms(memory_lines(tmp_path / "memory.ttl"), world) == []
 
 
 def test_an_episode_with_an_intervention_teaches_the_steps_that_were_executed_as_planned(tmp_path: Path) -> None:
