@@ -55,7 +55,8 @@ FORMS = (
 def parse_interventions(problem: Problem, texts: Iterable[str]) -> list[Intervention]:
     """Return the interventions that texts describe.
 
-    A text may also name a file with one intervention per line (``#`` begins a comment).
+    A text may also name a file with one intervention per line (``#`` begins a comment). An intervention may mention an individual
+    that an intervention before it adds.
 
     Raises
     ------
@@ -73,7 +74,10 @@ def parse_interventions(problem: Problem, texts: Iterable[str]) -> list[Interven
                 lines = [line.split("#")[0].strip() for line in path.read_text(encoding="utf-8").splitlines()]
             except UnicodeDecodeError as error:
                 raise KnowledgeError(f"{path}: not UTF-8 text ({error}); wanted one intervention per line") from error
-        found += [parse_intervention(problem, line) for line in lines if line]
+        for line in filter(None, lines):
+            found.append(parse_intervention(problem, line))
+            if found[-1].change is InterventionKind.ADD:
+                problem = _widened(problem, found[-1])
     return found
 
 
@@ -209,6 +213,14 @@ def _box(problem: Problem, words: list[str], text: str, when: dict[str, Any]) ->
     return Intervention(
         InterventionKind.BOX, (fact,), individual=name, kind=wheres[0].arguments[0], numbers=numbers, **when
     )
+
+
+def _widened(problem: Problem, added: Intervention) -> Problem:
+    """Return the problem with the individual that an intervention adds, and with the facts of this individual."""
+    from confab.planner.acting.symbolic_world import with_individual
+
+    initial = {**problem.initial, **{fact.symbol: fact.value for fact in added.facts}}
+    return replace(with_individual(problem, added.individual, added.kind), initial=initial)
 
 
 def _add(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -> Intervention:

@@ -342,7 +342,7 @@ class Behavior:
 
     A `price` replaces `cost`; a precondition requires that the price is a number (`priced`). `timing` states the spans of
     conditions and effects (`confab.reasoner.timing`). If effects on all members of a class were replaced by effects on each member,
-    `spread` contains the individuals that only these effects mention.
+    `every` contains the replaced effects, and `spread` contains the individuals that only the effects on each member mention.
     """
 
     name: str
@@ -356,6 +356,7 @@ class Behavior:
     spread: frozenset[str] = frozenset()
     price: Expression | None = None
     timing: Timing | None = None
+    every: tuple[Effect, ...] = ()
 
     def __post_init__(self) -> None:
         """Sort the effects in the order of their application."""
@@ -727,13 +728,24 @@ def spread(behavior: Behavior, classes: Mapping[str, Sequence[str]]) -> Behavior
     every = [one for effect in behavior.every_effect for one in single(effect)]
     effects = tuple(one for one in every if isinstance(one, ValueEffect))
     amounts = tuple(one for one in every if isinstance(one, AmountEffect))
-    kinds = {effect.each.kind for effect in behavior.every_effect if effect.each is not None}
+    replaced = tuple(effect for effect in behavior.every_effect if effect.each is not None)
+    kinds = {effect.each.kind for effect in replaced if effect.each is not None}
     all_of = frozenset(one for kind in kinds for one in classes.get(kind, ()))
     by_name = {one for effect in behavior.effects for one in (*effect.arguments, effect.value)}
     by_name |= {one for one in all_of if any(substituted(c, {one: "?"}) != c for c in behavior.conditions)}
     if timing is not None:
         timing = replace(timing, effects=tuple((at, one) for at, effect in timing.effects for one in single(effect)))
-    return replace(behavior, effects=effects, amounts=amounts, timing=timing, spread=all_of - by_name)
+    return replace(behavior, effects=effects, amounts=amounts, timing=timing, spread=all_of - by_name, every=replaced)
+
+
+def spread_to(behavior: Behavior, individual: str, kinds: Collection[str]) -> Behavior:
+    """Return a behaviour with the effects on one more member of the classes `kinds`; see `spread`."""
+    more = [made_of(one, individual) for one in behavior.every if one.each is not None and one.each.kind in kinds]
+    if not more:
+        return behavior
+    effects = (*behavior.effects, *(one for one in more if isinstance(one, ValueEffect)))
+    amounts = (*behavior.amounts, *(one for one in more if isinstance(one, AmountEffect)))
+    return replace(behavior, effects=effects, amounts=amounts, spread=behavior.spread | {individual})
 
 
 def allowed(behavior: Behavior, situations: Mapping[str, SituationType]) -> tuple[Condition, ...]:

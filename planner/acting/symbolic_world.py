@@ -12,7 +12,7 @@ from confab.planner.plan import Step
 from confab.planner.validation import successor
 from confab.reasoner.aggregates.totals import following
 from confab.reasoner.possible import PLACE, refuse_impossible
-from confab.reasoner.symbols import Problem, State, Symbol
+from confab.reasoner.symbols import Problem, State, Symbol, spread_to
 
 DONE = Report(True)
 FaultInjection = Callable[[Step, State], Report | None]
@@ -188,7 +188,10 @@ def _is_whereabouts(problem: Problem, situation: str) -> bool:
 
 
 def with_individual(problem: Problem, individual: str, kind: str) -> Problem:
-    """Return the problem with one more individual, which comes last in the order of each of its classes."""
+    """Return the problem with one more individual, which comes last in the order of each of its classes.
+
+    The effects on all members of a class are also effects on this individual.
+    """
     kinds, waiting = {kind}, [kind]
     while waiting:
         for parent in problem.parents.get(waiting.pop(), ()):
@@ -199,7 +202,10 @@ def with_individual(problem: Problem, individual: str, kind: str) -> Problem:
         name: (*members, individual) if name in kinds and individual not in members else members
         for name, members in problem.classes.items()
     }
-    return replace(problem, classes=classes)
+    behaviors = problem.domain.behaviors
+    spread = {name: spread_to(behavior, individual, kinds) for name, behavior in behaviors.items()}
+    domain = replace(problem.domain, behaviors=spread) if spread != behaviors else problem.domain
+    return replace(problem, classes=classes, domain=domain)
 
 
 def met(problem: Problem, found: Discovery) -> Problem:

@@ -13,13 +13,15 @@ import confab
 from confab import ontology
 from confab.execution import episode_json, execute, parse_interventions
 from confab.live import View, in_terminal
-from confab.planner.acting.episode import Event, Intervention, InterventionKind
+from confab.planner.acting.episode import End, Event, Intervention, InterventionKind
 from confab.planner.acting.symbolic_world import SymbolicWorld
 from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, read_into, text
 from confab.reasoner.memory.episodes import assert_episode
+from confab.reasoner.symbols import Symbol
 from confab.reasoner.validation.validate import validate
 from confab.reasoner.vocabulary import EPISODES, PROV
 
+EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 FIGURE_8 = ("after=28 cup2 LOCATION location8", "after=28 goal cup2 LOCATION location8")
 
 
@@ -93,6 +95,15 @@ def test_misuse_is_one_clear_line(arguments: list[str], word: str) -> None:
     assert done.returncode == 2
     assert word in done.stderr
     assert done.stderr.count("\n") == 1
+
+
+def test_a_goal_about_an_added_individual_is_reached_by_an_effect_on_all_members_of_its_class() -> None:
+    theatre = confab.load(EXAMPLES / "theatre" / "first-night.ttl")
+    first = f"after={theatre.plan().plan[0].id}"
+    run = theatre.execute(interventions=[f"{first} add Prop parcel AT stage", f"{first} goal parcel AT store"])
+    assert run.episode.status is End.REACHED
+    assert run.episode.observed[Symbol("AT", ("parcel",))] == "store"
+    assert "parcel" not in {one for step in run.episode.done.steps if step.behavior == "PUSH" for one in step.arguments}
 
 
 def test_every_form_of_intervention_is_read() -> None:
