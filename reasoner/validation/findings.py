@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
@@ -12,6 +13,7 @@ from pathlib import Path
 import pyoxigraph as ox
 
 from confab.reasoner.graph.knowledge import KnowledgeGraph, readable
+from confab.reasoner.limits import check
 from confab.reasoner.names import local_name
 from confab.reasoner.updates.texts import Place
 from confab.reasoner.vocabulary import CORE, RDFS
@@ -21,6 +23,8 @@ CAUSES = ("unreadable", "undeclared-term")
 """Rules whose findings are listed first because other findings may be their consequences."""
 
 LABEL = ox.NamedNode(RDFS + "label")
+NAME = re.compile(r"[:/#]([^\s:/#<>()\[\]\"',;]+)(?<!\.)")
+PREFIX = re.compile(r"^\s*@?prefix\s+([\w.-]*):\s*<([^>]*)>", re.MULTILINE | re.IGNORECASE)
 TEXTS = tuple(ox.NamedNode(CORE + name) for name in ("update", "construct"))
 
 
@@ -98,19 +102,23 @@ class Places:
 
     def __init__(self, graph: KnowledgeGraph) -> None:
         self.graph = graph
+        self._lines: dict[Path, _Lines] = {}
 
     def finding(self, rule: str, node: str, what: str, why: str, remedy: str, severity: str = ERROR) -> Finding:
         """Return a finding on a node; for a node that was compiled from an update, the position is in the update."""
+        check("validating the ontology")
         if node in self.graph.written:
             return self.in_update(rule, self.graph.written[node], what, why, remedy, severity)
         file = self._files.get(node) or self._naming(node) or self.graph.path
-        return Finding(str(file or ""), _line(file, node), node, self.label(node), rule, what, why, remedy, severity)
+        return Finding(
+            str(file or ""), self._line(file, node), node, self.label(node), rule, what, why, remedy, severity
+        )
 
     def in_update(self, rule: str, place: Place, what: str, why: str, remedy: str, severity: str = ERROR) -> Finding:
         """Return a finding on a part of an update, with the behaviour as the node, and the line of the part."""
         node = place.behavior
         file = self._files.get(node) or self.graph.path
-        line = _line(file, node)
+        line = self._line(file, node)
         said = [
             quad for text in TEXTS for quad in self.graph.store.quads_for_pattern(ox.NamedNode(node), text, None, None)
         ]
@@ -140,6 +148,13 @@ class Places:
             if short or f"<{node}>" in text:
                 return file
         return None
+
+    def _line(self, file: Path | None, node: str) -> int:
+        if file is None:
+            return 0
+        if file not in self._lines:
+            self._lines[file] = _Lines(file)
+        return self._lines[file].of(node)
 
     @cached_property
     def _files(self) -> Mapping[str, Path]:
@@ -185,17 +200,26 @@ def relative(node: str, file: Path) -> str:
     return node.removeprefix(own) if node.startswith(own) else node.removeprefix(f"{own.rpartition('/')[0]}/")
 
 
-def _line(file: Path | None, node: str) -> int:
-    """Return the first line of a Turtle file that states something about a node, or else the first line that mentions the node."""
-    if file is None or file.suffix != ".ttl":
-        return 0
-    text, short = file.read_text(encoding="utf-8"), local_name(node)
-    if node.startswith("file:") and (begin := text.find(f"<{relative(node, file)}>")) >= 0:
-        return text.count("\n", 0, begin) + 1
-    name, space = re.escape(short), re.escape(node.removesuffix(short))
-    prefixes = re.findall(rf"^\s*@?prefix\s+([\w.-]*):\s*<{space}>", text, re.MULTILINE | re.IGNORECASE)
-    own = "|".join(map(re.escape, prefixes)) if prefixes else r"(?!)"
-    for pattern in (rf"^(?:{own}):{name}(?=\s)", rf"^<{re.escape(node)}>", rf"[:/#]{name}(?![\w.-])"):
-        if found := re.search(pattern, text, re.MULTILINE):
-            return text.count("\n", 0, found.start()) + 1
-    return 0
+class _Lines:
+    """The lines of a Turtle file: the first line that begins with a word, and the first line that mentions a name."""
+
+    def __init__(self, file: Path) -> None:
+        self.file = file
+        self.text = file.read_text(encoding="utf-8") if file.suffix == ".ttl" else ""
+        self.heads, self.names = dict[str, int](), dict[str, int]()
+        for number, line in enumerate(self.text.split("\n"), 1):
+            self.heads.setdefault(re.split(r"\s", line, maxsplit=1)[0], number)
+            for name in NAME.findall(line):
+                self.names.setdefault(name, number)
+        self.prefixes: dict[str, list[str]] = defaultdict(list)
+        for prefix, space in PREFIX.findall(self.text):
+            self.prefixes[space].append(prefix)
+
+    def of(self, node: str) -> int:
+        """Return the first line that states something about a node, or else the first line that mentions the node, or else 0."""
+        short = local_name(node)
+        if node.startswith("file:") and (begin := self.text.find(f"<{relative(node, self.file)}>")) >= 0:
+            return self.text.count("\n", 0, begin) + 1
+        words = [*(f"{prefix}:{short}" for prefix in self.prefixes.get(node.removesuffix(short), ())), f"<{node}>"]
+        found = [self.heads[word] for word in words if word in self.heads]
+        return min(found) if found else self.names.get(short, 0)

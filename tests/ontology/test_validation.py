@@ -281,3 +281,19 @@ def test_an_undeclared_setting_is_reported_with_its_declaration(tmp_path: Path) 
     own = ":swayWidth a owl:DatatypeProperty ; rdfs:subPropertyOf e:setting . e:lift :swayWidth 0.1 .\n"
     file.write_text(file.read_text(encoding="utf-8") + own, encoding="utf-8")
     assert not [finding for finding in validate([scene]) if finding.rule in ("unknown-setting", "unreadable-body")]
+
+
+def test_the_file_is_read_only_a_few_times_for_many_findings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = skeleton(tmp_path)
+    plates = (f":p{i} a owl:NamedIndividual, d:Plate ; d:cleanliness :table .\n" for i in range(200))
+    scene.write_text(scene.read_text() + "".join(plates))
+    loaded, reads, read_text = confab.load(scene), list[Path](), Path.read_text
+
+    def counted(path: Path, encoding: str | None = None) -> str:
+        reads.append(path)
+        return read_text(path, encoding)
+
+    monkeypatch.setattr(Path, "read_text", counted)
+    errors = quick_errors(loaded.knowledge)
+    assert len({error.line for error in errors}) == 200
+    assert reads.count(scene) < 10
