@@ -373,14 +373,8 @@ def _value_properties(schema: Schema) -> dict[str, tuple[str, bool]]:
 def _check_behavior(behavior: Behavior, domain: Domain) -> None:
     """Raise `KnowledgeError` if a behaviour is faulty.
 
-    A fault is two terms with equal names, a wrong number of arguments, or a situation type that doesn't exist on the behaviour's
-    level.
+    A fault is a wrong number of arguments, or a situation type that doesn't exist on the behaviour's level.
     """
-    names = [term.name for term in (*behavior.parameters, *behavior.variables)]
-    if twice := sorted({name[1:] for name in names if names.count(name) > 1}):
-        raise KnowledgeError(
-            f"{behavior.name} has several terms called {', '.join(twice)}; give each a name of its own"
-        )
     conditions = [inner for condition in behavior.conditions for inner in walk(condition)]
     compared = [side for c in conditions if isinstance(c, Comparison) for side in (c.left, c.right)]
     amounts = (*compared, *(effect.amount for effect in behavior.amounts))

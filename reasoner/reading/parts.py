@@ -246,6 +246,7 @@ class Parts(NodeReader):
         """Return a behaviour with its terms, conditions, effects, cost and timing."""
         parameters = tuple(map(self.parameter, ordered(self.values(iri, "parameter"), self.nodes, self.names)))
         used = sorted(self.terms_below(iri) - set(self.values(iri, "parameter")))
+        self.check_names(iri, (*self.values(iri, "parameter"), *used))
         asked = [(self.span(one), c) for one in self.values(iri, "precondition") for c in self.group(one)]
         made = [(self.span(one), self.effect(one)) for one in self.values(iri, "postcondition")]
         price, duration = self.price(iri), self.duration(iri)
@@ -271,6 +272,16 @@ class Parts(NodeReader):
             price=price,
             timing=None if plain else timing,
         )
+
+    def check_names(self, iri: str, terms: Sequence[str]) -> None:
+        """Raise `KnowledgeError` if two terms of a behaviour have the same name."""
+        called = [self.term(term) for term in terms]
+        for name in sorted({name for name in called if called.count(name) > 1}):
+            same = " and ".join(sorted(local_name(t) for t, other in zip(terms, called, strict=True) if other == name))
+            raise KnowledgeError(
+                f"{local_name(iri)} has several terms called {name[1:]}: {same}; give each a name of its own, or let the price, "
+                f"the duration and the conditions of {local_name(iri)} refer to its own term"
+            )
 
     def span(self, iri: str) -> Span:
         """Return the time span of a behaviour's condition or effect."""

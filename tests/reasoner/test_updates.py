@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import confab
 from confab import ontology
 from confab.planner.solve import Request, solve
 from confab.reasoner.amounts import Amount, Calculation, Measure
@@ -296,3 +297,21 @@ def test_validation_and_loading_report_a_fault_of_an_update_with_its_line(tmp_pa
     assert (finding.rule, finding.line, local_name(finding.node)) == ("update", line, "MOVE")
     with pytest.raises(KnowledgeError, match=r"small#MOVE>: :spto is .*\(line 2, column 8 of the update of MOVE\)"):
         load(path)
+
+
+def test_a_price_about_the_terms_of_the_extended_behaviour_is_reported_with_both_terms(tmp_path: Path) -> None:
+    confab.new_domain("far", tmp_path)
+    with (tmp_path / "far.ttl").open("a", encoding="utf-8") as file:
+        file.write(
+            ":B1_RUSH a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 9 ; c:extends :B1_HURRY ; c:price :B1_HURRY.price ; "
+            'c:update "INSERT {} WHERE {}" . '
+            ":B1_HURRY a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 8 ; c:price :B1_HURRY.price ; "
+            'c:update "INSERT { ?item :cleanliness :clean } WHERE { ?item a :Item . ?item :isAt ?where }" . '
+            ":B1_HURRY.price a owl:NamedIndividual, c:Calculation ; c:about :B1_HURRY.where ; c:relation :far . "
+            ":far a owl:DatatypeProperty, owl:NamedIndividual, c:Relation ; rdfs:domain :Place ; "
+            "rdfs:range <http://www.w3.org/2001/XMLSchema#decimal> .\n"
+        )
+    with pytest.raises(
+        KnowledgeError, match=r"called where: B1_HURRY\.where and B1_RUSH\.where; give each a name of its own"
+    ):
+        _ = confab.load(tmp_path / "far-scene.ttl").problem
