@@ -317,7 +317,7 @@ class RulePolicy:
             return True
         mark, age = len(table.trail), table.age
         table.put(*goal[0], goal[1])
-        holds = self.call.space.subgoals.holds(achiever, achiever.soft[position], instance.named)
+        holds = self.call.space.subgoals.tests.holds(achiever, achiever.soft[position], instance.named)
         table.undo(mark)
         if self.instances.age == age:
             self.instances.age = table.age  # undoing has restored the state

@@ -165,7 +165,7 @@ class Instances:
         found = self.picked.get((id(candidates), situation))
         if found is None:
             self.allowance.spent += len(candidates)
-            table, symmetry, wanted = self.call.table, self.call.program.symmetry, self.call.space.subgoals.wanted
+            table, symmetry, wanted = self.call.table, self.call.program.symmetry, self.call.space.candidates.wanted
             found = free = tuple([c for c in candidates if c not in self.excluded]) if self.excluded else candidates
             if len(free) > FEW:
                 among = set(candidates)

@@ -56,15 +56,15 @@ class Methods:
 
         An assignment contains the individuals of the step, None for each determined role, and a candidate for each other role.
         """
-        subgoals = self.space.subgoals
+        candidates = self.space.candidates
         choices: list[Sequence[str | None]] = []
         for role in method.open:
             if role.source is not None:
                 choices.append((None,))
             elif role.becomes is not None:
-                choices.append(subgoals.candidates(role.becomes, "", role.kind))
+                choices.append(candidates.values(role.becomes, "", role.kind))
             else:
-                choices.append(subgoals.one_of_each(role.kind))
+                choices.append(candidates.one_of_each(role.kind))
         ways: list[Roles] = [individuals + chosen for chosen in islice(product(*choices), CHOICES)]
         return self.ranked(method, ways) if len(ways) > 1 else ways
 

@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TypeAlias
 
+from confab.planner.hierarchical.condition_tests import Env
 from confab.planner.hierarchical.operators import Achiever
-from confab.planner.hierarchical.subgoals import Env, Subgoal
+from confab.planner.hierarchical.subgoals import Subgoal
 from confab.planner.hierarchical.workspace import Ground, Workspace
 from confab.planner.transitions import Cell, Key, arguments_of
 from confab.reasoner.symbols import TRUE

@@ -128,7 +128,7 @@ def focus(space: Workspace, level: int, targets: Mapping[Cell, str], budget: Sea
     for members in program.problem.classes.values():
         if len(members) <= FEW:
             met.update(dict.fromkeys(members))
-    met.update(dict.fromkeys(space.subgoals.spare(met, level, budget.spares)))
+    met.update(dict.fromkeys(space.candidates.spare(met, level, budget.spares)))
     for individual in tuple(met):  # add the values of the individual, and the few objects whose value is the individual
         for situation, cells in table.now.items():
             if program.domain.situations[situation].level > level:

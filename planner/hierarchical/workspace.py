@@ -76,6 +76,7 @@ class Workspace:
         bound = self.program.bind(self.table)
         self.forward, self.achieve = bound.forward, bound.achieve
         self.subgoals = Subgoals(self.program, self.table, self.goal)
+        self.candidates = self.subgoals.candidates
         self.counts = {level: Counts() for level in self.program.levels}
         self.defined = [cell for cell in self.goal if cell[0] in self.program.rules]
         self.rest = {s.name: s.rest for s in self.program.domain.situations.values() if s.rest is not None}

@@ -7,12 +7,13 @@ from typing import Any
 import pytest
 
 from confab.planner.hierarchical.call import Call, Compiled
+from confab.planner.hierarchical.condition_tests import Env
 from confab.planner.hierarchical.operators import Achiever, Program
 from confab.planner.hierarchical.planner import plan
 from confab.planner.hierarchical.relevance import relevant
 from confab.planner.hierarchical.scope import focus
 from confab.planner.hierarchical.search_budget import WIDER
-from confab.planner.hierarchical.subgoals import Env, Subgoals
+from confab.planner.hierarchical.subgoals import Subgoals
 from confab.planner.plan import Limits, Status
 from confab.planner.transitions import Cell
 from confab.reasoner.symbols import Condition, Problem, RelationCondition, SituationType, Witness
@@ -28,9 +29,9 @@ def disable_cache(subgoals: Subgoals, monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the cache keep no results."""
 
     def would_hold(achiever: Achiever, condition: Condition, env: Env, term: str, value: str) -> bool:
-        return subgoals.holds(achiever, condition, {**env, term: value})
+        return subgoals.tests.holds(achiever, condition, {**env, term: value})
 
-    monkeypatch.setattr(subgoals, "_would_hold", would_hold)
+    monkeypatch.setattr(subgoals.tests, "would_hold", would_hold)
 
 
 @pytest.mark.parametrize(("name", "problem"), CASES, ids=[name for name, _ in CASES])
