@@ -26,7 +26,7 @@ from unittest.mock import patch
 from confab.plan_options import NO_ENGINE
 from confab.planner.acting.episode import End
 from confab.planner.certificates import Certificate
-from confab.planner.plan import Outcome, Plan, Status
+from confab.planner.plan import Outcome, Plan, Reason, Status, UnsolvableError
 from confab.planner.validation import Facts, successor, validate
 from confab.planning import plan
 from confab.reasoner.amounts import written
@@ -424,8 +424,9 @@ class Judge:
         """Certify the task without a search, and judge the certificates without the planner.
 
         The planner hides a wrong certificate, since it gives up if the checker rejects the certificate. The certificate of each
-        kind is judged, too, since one kind hides the faults of another. Certificates of cases and of states have to be found for
-        each task without a plan. The checker must reject certificates that have lost a claim or have a false one.
+        kind is judged, too, since one kind hides the faults of another. A missing certificate is a remark: certificates of cases and
+        of states should be found for each task without a plan, those of facts and of pairs only for some of these tasks. The
+        checker must reject certificates that have lost a claim or have a false one.
         """
         from confab.planner.certificate_checks import refusal
         from confab.planner.certifying import KINDS
@@ -434,7 +435,7 @@ class Judge:
             problem, found, mode = read.reading.problem, self.found, f"proofs by {kind}"
             one = certificate(kind, problem)
             if one is None:
-                if found.known and found.least is None and kind in ("all", "cases", "states"):
+                if found.known and found.least is None:
                     found.remarks.append(Complaint("no certificate", mode, ""))
                 return
             if found.least is not None and self.surely is not None:
@@ -449,6 +450,22 @@ class Judge:
 
         for kind in ("all", *KINDS):
             self.call(f"proofs by {kind}", partial(judged, kind))
+        self.call("proofs by a search", lambda: self.searched(read.reading.problem))
+
+    def searched(self, problem: Problem) -> None:
+        """Judge the proofs by relaxed reachability and by the examination of all states, which other proofs hide."""
+        from confab.planner.hierarchical.unsolvability import exhausted, proved
+
+        try:
+            task = proved(problem, problem.domain.levels[-1])
+            states = None if isinstance(task, Reason) else exhausted(task, MOST)
+            proof = None if states is None else states.text
+        except UnsolvableError as error:
+            proof = error.reason.text
+        if proof is not None and self.surely is not None:
+            self.complain("a proof although there is a plan", "proofs by a search", proof)
+        if proof is None and self.surely is None and self.found.known:
+            self.found.remarks.append(Complaint("no proof", "proofs by a search", ""))
 
     def false_certificates(self, read: Scene) -> None:
         """Test the certificate checker with certificates of tasks that lack one behaviour.
