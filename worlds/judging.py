@@ -60,6 +60,8 @@ STATES = 3
 """Number of reachable states, and of behaviours in each state, in which the plan checker is compared with the interpreter."""
 CORE_CLASSES = ("Parameter", "Level", "ValueCondition")
 """Names of classes of the core ontology that only the parts of behaviours belong to."""
+SLICED = 25
+"""Number of reachable states in which behaviours in a part of a world are compared with those in the world."""
 FEW_CASES = 30
 """Maximum number of cases of a certificate that is corrupted, so that its checks take little time."""
 T = TypeVar("T")
@@ -373,11 +375,12 @@ class Judge:
         The last query of recognition, which follows all routes at once, is needed after few other queries only.
         """
         few = self.rng.choice((1, 2, relevance.ROUNDS))
+        states = self.rng.sample(self.reached, min(len(self.reached), SLICED)) or [self.meant.initial]
         for meant, goals in ((self.meant, []), self.other_goal()):
             with patch.object(relevance, "ROUNDS", few):
                 part = relevance.recognise(read.knowledge, goals)
             try:
-                said = "" if part.whole else difference(meant, Interpreter(part.problem), MOST)
+                said = "" if part.whole else difference(meant, Interpreter(part.problem), states, MOST)
             except TooManyStatesError:
                 continue
             if said:
@@ -424,9 +427,9 @@ class Judge:
         """Certify the task without a search, and judge the certificates without the planner.
 
         The planner hides a wrong certificate, since it gives up if the checker rejects the certificate. The certificate of each
-        kind is judged, too, since one kind hides the faults of another. A missing certificate is a remark: certificates of cases and
-        of states should be found for each task without a plan, those of facts and of pairs only for some of these tasks. The
-        checker must reject certificates that have lost a claim or have a false one.
+        kind is judged, too, since one kind hides the faults of another. Certificates of cases and of states should be found for
+        each task without a plan, and certificates of facts and of pairs for some of these tasks, so a missing certificate is a
+        remark. The checker must reject certificates that have lost a claim or have a false one.
         """
         from confab.planner.certificate_checks import refusal
         from confab.planner.certifying import KINDS

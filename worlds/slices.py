@@ -6,21 +6,20 @@ plan is refused or if the part has no plan. Therefore the part itself is compare
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from confab.reasoner.aggregates.dependencies import read_by
 from confab.reasoner.amounts import situations_in
 from confab.reasoner.language import situations_of, walk
-from confab.reasoner.symbols import Problem, Symbol
+from confab.reasoner.symbols import Problem
 from worlds.interpreter import Interpreter, State
 
 
-def difference(meant: Interpreter, part: Interpreter, most: int) -> str:
+def difference(meant: Interpreter, part: Interpreter, states: Sequence[State], most: int) -> str:
     """Return the difference between a world and a part of the world, for the goal of the world; an empty text if there is none.
 
-    On each level, the part must have the same least cost of the goal. The symbols of the part on which the goal depends must get
-    the same combinations of values, with the same least costs.
+    On each level, the part must have the same least cost of the goal. In each of the given states, each behaviour of the part must
+    do the same as in the world, and no other behaviour may change the part, as far as the goal depends on it.
 
     Raises
     ------
@@ -31,27 +30,31 @@ def difference(meant: Interpreter, part: Interpreter, most: int) -> str:
         return f"the goals differ: {missing}"
     kinds = relevant(meant.problem)
     symbols = [symbol for symbol in part.symbols if symbol.situation in kinds]
+
+    def seen(by: Interpreter, state: State) -> State:
+        values = (by.value(state, symbol) for symbol in symbols)
+        return tuple("nothing" if value is None or value != value else value for value in values)
+
     for level in meant.problem.domain.levels:
-        costs = [_costs(one, one.explored(level, most, rests=False).costs, symbols) for one in (meant, part)]
-        if costs[0] != costs[1]:
-            state, cost = min({*costs[0].items()} ^ {*costs[1].items()}, key=lambda item: float(item[1]))
-            first = [meant.value(meant.initial, symbol) for symbol in symbols]
-            changed = {s: v for s, v, old in zip(symbols, state, first, strict=True) if v != old}
-            of = [one.get(state, "not reached") for one in costs]
-            return f"level {level}: {changed} costs {of[0]}, in the part {of[1]}; least of both {cost}"
-        least = [one.explored(level, most).least for one in (meant, part)]
+        actions = [one for one in meant.actions(level) if one.behavior.changes & kinds]
+        own = {(one.behavior.name, one.arguments) for one in part.actions(level)}
+        for state in states:
+            values = [meant.value(state, symbol) for symbol in part.symbols[: part.stated]]
+            values += part.initial[part.stated :]
+            inside, before = part.closed(values), seen(meant, state)
+            if seen(part, inside) != before:
+                return f"level {level}: the derived values differ in {state}"
+            for one in actions:
+                key = one.behavior.name, one.arguments
+                after = {(cost, seen(meant, made)) for cost, made in meant.done(*key, state)}
+                ours = {(cost, seen(part, made)) for cost, made in part.done(*key, inside)} if key in own else after
+                if ours != after or (key not in own and any(made != before for _, made in after)):
+                    which = "differs" if key in own else "is missing and changes the part"
+                    return f"level {level}: {key} {which} in {dict(zip(symbols, before, strict=True))}"
+        least = [by.explored(level, most).least for by in (meant, part)]
         if least[0] != least[1]:
             return f"level {level}: the goal costs {least[0]}, in the part {least[1]}"
     return ""
-
-
-def _costs(of: Interpreter, costs: Mapping[Any, Any], symbols: Iterable[Symbol]) -> dict[State, Any]:
-    """Return the least cost of each reachable combination of the symbols' values."""
-    found: dict[State, Any] = {}
-    for (state, _), cost in costs.items():
-        key = tuple("nothing" if (v := of.value(state, s)) is None or v != v else v for s in symbols)
-        found[key] = min(cost, found.get(key, cost))
-    return found
 
 
 def relevant(problem: Problem) -> set[str]:
