@@ -54,9 +54,9 @@ PARTS: dict[str, dict[str, str]] = {
 
 A planner that gives up in a world without a plan counts as a fault of a proof.
 """
-FIRST, WORLDS = 8_000_000, 200
+FIRST, WORLDS = 8_000_000, 120
 """First seed and number of worlds."""
-BUDGET, PLANS = 2.0, 6
+BUDGET, PLANS = 4.0, 6
 """CPU seconds of the worlds that are judged with a fault, as measured without the fault; number of changed copies of each plan."""
 SECONDS, WAITING = 60, 600.0
 """CPU seconds for the worlds of a fault, and seconds by the clock for a call on a busy machine."""

@@ -41,7 +41,7 @@ from worlds.corrupted import corrupted, numbered, random_steps
 from worlds.false_certificates import accepted, of_a_task_with_a_plan
 from worlds.false_certificates import corrupted as corrupted_certificates
 from worlds.interpreter import Interpreter, State, TooManyStatesError
-from worlds.mixed import RandomWorld
+from worlds.mixed import RandomWorld, crowded
 from worlds.scenes import scene
 from worlds.slices import difference
 from worlds.walking import cost, faults
@@ -264,6 +264,7 @@ class Judge:
         if self.sampled(RECOGNITION, "recognition", "recognition"):
             self.call("recognition", lambda: self.recognition(read))
             self.call("recognition of names", lambda: self.names(file))
+            self.call("recognition of a crowd", lambda: self.crowd(file))
 
     def outcome(self, read: Scene, name: str, **options: Any) -> Outcome | None:
         """Plan in one mode, compare the outcome with the exhaustive search, and return the outcome."""
@@ -372,31 +373,42 @@ class Judge:
     def recognition(self, read: Scene) -> None:
         """Compare the part of the scene that task recognition selects with the whole scene, for the task and for another goal.
 
-        The last query of recognition, which follows all routes at once, is needed after few other queries only.
+        A larger world of the same seed is compared, too. The last query of recognition, which follows all routes at once, is
+        needed after few other queries only.
         """
-        few = self.rng.choice((1, 2, relevance.ROUNDS))
         states = self.rng.sample(self.reached, min(len(self.reached), SLICED)) or [self.meant.initial]
-        for meant, goals in ((self.meant, []), self.other_goal()):
-            with patch.object(relevance, "ROUNDS", few):
-                part = relevance.recognise(read.knowledge, goals)
-            try:
-                said = "" if part.whole else difference(meant, Interpreter(part.problem), states, MOST)
-            except TooManyStatesError:
-                continue
-            if said:
-                self.complain("the part of the scene differs", "recognition", f"{goals}, {few} queries: {said}")
+        self.part(read, self.meant, states, [])
+        self.part(read, *self.other_goal(states))
 
-    def other_goal(self) -> tuple[Interpreter, list[str]]:
-        """Return an interpreter of the world with another goal, from a reachable state, and the text of the goal."""
-        state = self.rng.choice(self.reached or [self.meant.initial])
-        symbols = [s for s, slot in self.meant.slots.items() if slot < self.meant.stated]
+    def crowd(self, file: Path) -> None:
+        """Compare the part of a larger world with that world."""
+        world, meant, states = crowded(self.world.seed, constrained=0.3)
+        file.write_text(scene(world), encoding="utf-8")
+        self.part(load(file), meant, states[:: 1 + len(states) // SLICED], [], MOST // 100)
+
+    def part(self, read: Scene, meant: Interpreter, states: list[State], goals: list[str], most: int = MOST) -> None:
+        """Compare the part of a scene that task recognition selects for goals with the whole scene."""
+        few = self.rng.choice((2, 3, relevance.ROUNDS))
+        with patch.object(relevance, "ROUNDS", few):
+            part = relevance.recognise(read.knowledge, goals)
+        said = "" if part.whole else difference(meant, Interpreter(part.problem), states, most)
+        if said:
+            self.complain("the part of the scene differs", "recognition", f"{goals}, {few} queries: {said}")
+
+    def other_goal(self, states: list[State]) -> tuple[Interpreter, list[State], list[str]]:
+        """Return an interpreter of the world with another goal, from a state, with the states and with the text of the goal."""
+        symbols = [s for s, slot in self.meant.slots.items() if slot < self.meant.stated and not self.amount(s)]
         if not symbols:
-            return self.meant, []
-        changed = [s for s in symbols if self.meant.value(state, s) != self.meant.value(self.meant.initial, s)]
+            return self.meant, states, []
+        changed = [s for s in symbols if self.meant.value(states[0], s) != self.meant.value(self.meant.initial, s)]
         symbol = self.rng.choice(changed or symbols)
-        value = _text(self.meant.value(state, symbol))
+        value = self.meant.value(states[0], symbol)
         words = symbol.arguments[0], symbol.situation, *symbol.arguments[1:], value
-        return self.meant.wanting({**self.meant.problem.goal, symbol: value}), [" ".join(words)]
+        return self.meant.wanting({**self.meant.problem.goal, symbol: value}), states, [" ".join(words)]
+
+    def amount(self, symbol: Symbol) -> bool:
+        """Return whether a symbol has a number."""
+        return self.meant.kinds[symbol.situation].quantity is not None
 
     def names(self, file: Path) -> None:
         """Compare the names in the part with those in the whole scene, with other terms that have the same local names.

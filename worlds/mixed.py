@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import product
+from math import prod
 from random import Random
 from typing import Any
 
@@ -51,7 +52,10 @@ FEW = 8
 """A world with fewer states than this number is usually drawn again."""
 EXCLUDED = 0.33
 """Share of worlds whose goal is, if possible, satisfied by no reachable state."""
-TRIES = 8
+GROUNDED = 400
+"""Maximum number of grounded behaviours and rules of a larger world without exhaustive search."""
+TRIES, WALK = 8, 120
+"""Number of attempts to draw something that fits, and of the steps that a random walk tries."""
 NEAR = 0.25
 """Share of the goals reachable in one step that are kept."""
 AGGREGATED = 0.4
@@ -116,6 +120,34 @@ def drawn(
         if goal:
             meant = interpreter.wanting(goal)
             return _with_derived_goal(replace(world, problem=meant.problem), meant)
+
+
+def crowded(seed: int, constrained: float = 0.0) -> tuple[RandomWorld, Interpreter, list[State]]:
+    """Return a random world with more individuals and a goal of one fact, its interpreter, and the states of a random walk.
+
+    Such a world can have too many states for an exhaustive search.
+    """
+    rng = Random(f"crowded {seed}")
+    while True:
+        world = _Draft(rng, seed, AGGREGATED, constrained, 0.0, 0.0, rng.choice((1, 2, 3))).world()
+        domain, classes = world.problem.domain, world.problem.classes
+        behaviors = [*domain.behaviors.values(), *(one.behavior for one in domain.aggregates.values())]
+        behaviors += [rule.behavior for rules in domain.rules.values() for rule in rules]
+        if sum(prod(len(classes[kind]) for kind in one.kinds.values()) for one in behaviors) > GROUNDED:
+            continue
+        meant = Interpreter(world.problem)
+        names = [(one.behavior.name, one.arguments) for one in meant.actions(world.problem.domain.levels[-1])]
+        states = [meant.initial]
+        for name, arguments in rng.choices(names, k=WALK) if names else ():
+            states += [state for _, state in list(meant.done(name, arguments, states[-1]))[:1] if state != states[-1]]
+        first, last = states[0], states[-1]
+        changed = [symbol for symbol, i in meant.slots.items() if i < meant.stated and first[i] != last[i]]
+        if changed:
+            symbol = rng.choice(changed)
+            value = meant.value(last, symbol)
+            goal = {symbol: value if isinstance(value, str) else written(value)}
+            meant = meant.wanting(goal)
+            return replace(world, problem=meant.problem), meant, states
 
 
 def _with_derived_goal(world: RandomWorld, meant: Interpreter) -> tuple[RandomWorld, Interpreter]:
@@ -243,9 +275,17 @@ class _Draft(Vocabulary):
     """A randomly drawn world without its goal."""
 
     def __init__(
-        self, rng: Random, seed: int, aggregated: float, constrained: float, remembered: float, mutual: float
+        self,
+        rng: Random,
+        seed: int,
+        aggregated: float,
+        constrained: float,
+        remembered: float,
+        mutual: float,
+        crowd: int = 0,
     ) -> None:
         super().__init__(rng)
+        self.crowd = crowd
         self.seed, self.share, self.prevented = seed, aggregated, constrained
         self.remembered, self.connected = remembered, mutual
         self.forbidden: list[str] = []  # situation types of which a constraint is drawn
@@ -301,8 +341,8 @@ class _Draft(Vocabulary):
             number += many
             return tuple(f"{letter}{i}" for i in range(number - many + 1, number + 1))
 
-        own, sub = some("a", rng.choice((1, 1, 2, 2, 3))), some("a", rng.choice((0, 0, 1, 1, 2)))
-        b = some("z", rng.choice((0, 1, 1, 2, 2, 3)))
+        own, sub = some("a", rng.choice((1, 1, 2, 2, 3)) + self.crowd), some("a", rng.choice((0, 0, 1, 1, 2)))
+        b = some("z", rng.choice((0, 1, 1, 2, 2, 3)) + self.crowd)
         # in sorted order, the names of B are after "true", and the other names are before "false"
         self.classes = {"Truth": (FALSE, TRUE), "A": (*own, *sub), "A1": sub, "B": b}
         self.objects = (*own, *sub, *b)
@@ -495,9 +535,12 @@ class _Draft(Vocabulary):
             s
             for s in self.situations.values()
             if len(s.arguments) == 1
+            and s.level <= writer.level
             and of & set(self.classes[s.arguments[0]])
             and set(writer.kinds_of(other)) & set(self.classes.get(s.range, ()))
         ]
+        if "near" in self.relations and self.crowd and self.chance(0.5):
+            return RelationCondition("near", (one, other))
         if not found:
             return writer.value([one, other], one)
         return ValueCondition(self.rng.choice(found).name, (one,), other)
@@ -651,10 +694,16 @@ class _Draft(Vocabulary):
         rng, writer = self.rng, Phrases(self, level)
         parameters = [writer.fresh(rng.choice(("A", "A", "B", "A1"))) for _ in range(rng.choice((0, 1, 1, 2, 2)))]
         bound = list(parameters)
-        conditions = writer.conditions(bound, rng.choice((0, 1, 1, 2, 3)), 1)
+        conditions = writer.conditions(bound, rng.choice((0, 0, 1) if self.crowd else (0, 1, 1, 2, 3)), 1)
+        if self.crowd:  # related parameters lead recognition to few individuals
+            pairs = [(one, self.rng.choice(parameters[:i])) for i, one in enumerate(parameters) if i]
+            conditions += [
+                self.joining(writer, *pair) if self.chance(0.5) else self.joining(writer, *pair[::-1]) for pair in pairs
+            ]
         if self.made and self.chance(0.6) and (link := writer.link(bound, rng.choice(self.made))):
             conditions.append(link)
-        found = self.with_effects(name, level, writer, parameters, bound, conditions, rng.choice((1, 1, 2, 3)))
+        many = rng.choice((1, 1, 2) if self.crowd else (1, 1, 2, 3))
+        found = self.with_effects(name, level, writer, parameters, bound, conditions, many)
         self.made += [effect for effect in found.effects if not effect.value.startswith("?")]
         return found
 

@@ -54,6 +54,8 @@ class Vocabulary:
         self.aggregates: dict[str, Aggregate] = {}
         self.remembers: dict[str, str] = {}
         self.objects: tuple[str, ...] = ()
+        self.crowd = 0
+        """Number of additional individuals of each class; with such individuals, few effects concern a whole class."""
 
 
 HIGHEST = 9
@@ -256,7 +258,7 @@ class Phrases:
             return
         each, terms = None, list[str | None]()
         for kind in one.arguments:
-            if each is None and kind in ("A", "B", "A1") and rng.random() < 0.25:
+            if each is None and kind in ("A", "B", "A1") and rng.random() < (0.08 if draft.crowd else 0.25):
                 each = Parameter(EACH, rng.choice((kind, kind, "A1")))
                 self.inner[EACH] = each.kind
                 terms.append(EACH)

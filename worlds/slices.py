@@ -7,24 +7,21 @@ plan is refused or if the part has no plan. Therefore the part itself is compare
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 from confab.reasoner.aggregates.dependencies import read_by
 from confab.reasoner.amounts import situations_in
 from confab.reasoner.language import situations_of, walk
 from confab.reasoner.symbols import Problem
-from worlds.interpreter import Interpreter, State
+from worlds.interpreter import Interpreter, State, TooManyStatesError
 
 
 def difference(meant: Interpreter, part: Interpreter, states: Sequence[State], most: int) -> str:
     """Return the difference between a world and a part of the world, for the goal of the world; an empty text if there is none.
 
-    On each level, the part must have the same least cost of the goal. In each of the given states, each behaviour of the part must
-    do the same as in the world, and no other behaviour may change the part, as far as the goal depends on it.
-
-    Raises
-    ------
-    TooManyStatesError
-        The world or the part has more than `most` nodes.
+    In each of the given states, each behaviour of the part must do the same as in the world, and no other behaviour may change the
+    part, as far as the goal depends on it. On each level, the part must have the same least cost of the goal, unless the world or
+    the part has more than `most` nodes.
     """
     if missing := sorted({*meant.problem.goal.items()} ^ {*part.problem.goal.items()}):
         return f"the goals differ: {missing}"
@@ -51,9 +48,10 @@ def difference(meant: Interpreter, part: Interpreter, states: Sequence[State], m
                 if ours != after or (key not in own and any(made != before for _, made in after)):
                     which = "differs" if key in own else "is missing and changes the part"
                     return f"level {level}: {key} {which} in {dict(zip(symbols, before, strict=True))}"
-        least = [by.explored(level, most).least for by in (meant, part)]
-        if least[0] != least[1]:
-            return f"level {level}: the goal costs {least[0]}, in the part {least[1]}"
+        with suppress(TooManyStatesError):
+            least = [by.explored(level, most).least for by in (meant, part)]
+            if least[0] != least[1]:
+                return f"level {level}: the goal costs {least[0]}, in the part {least[1]}"
     return ""
 
 
