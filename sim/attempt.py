@@ -60,6 +60,9 @@ WITHDRAWAL_SPEED = 0.5
 SAMPLES = 6000
 """Maximum number of samples in the search for a path to one of the goals."""
 
+LOADED = (3.0, 1.5)
+"""Limit of the hand's acceleration in m/s² with a load, and with a load on which other bodies stand by friction alone."""
+
 FINER = 4
 """Factor by which a line that ends on contact is sampled more finely than other lines."""
 
@@ -190,9 +193,9 @@ class Attempt:
 
     @property
     def limits(self) -> MotionLimits:
-        """The hand's limits of speed and acceleration; the limits are lower with a load."""
-        limits = self.hand.limits
-        return limits if self.held is None else replace(limits, hand_velocity=0.9, hand_acceleration=3.0)
+        """The hand's limits of speed and acceleration, which are lower with a load, and with bodies that stand on the load."""
+        limits, load = self.hand.limits, self.world.load(self.held)
+        return replace(limits, hand_velocity=0.9, hand_acceleration=LOADED[len(load) > 1]) if load else limits
 
     def follow(
         self, q: Array, speed: float = 1.0, stop: Callable[[], bool] | None = None, corners: int = ROUNDED

@@ -12,7 +12,6 @@ from confab.reasoner.embodiment.values import PerceiverUse, Shape
 from confab.reasoner.symbols import Symbol
 from confab.sim.bodies import KINDS, center_height, outer_radius
 from confab.sim.engine import Thing
-from confab.sim.linkage import wide
 from confab.sim.staging import pour_in
 from confab.sim.urdf import Array
 from confab.sim.world import PhysicsWorld
@@ -90,7 +89,7 @@ def push_joint(world: PhysicsWorld, use: PerceiverUse, symbol: Symbol, value: st
         if min(hand.pressing(mechanic.body, mechanic.joints[name])) > 0:
             hand.open()
     opened = value == use.values.get("opened", "true")
-    goal = {name: wide(mechanic.link(name)) if opened else 0.0}
+    goal = {name: mechanic.link(name).wide if opened else 0.0}
     frame, origin = mechanic.frame(name)
     along = {body: frame.T @ (world.truth(body)[1] - origin) for body in world.bodies if world.carried_by(body) == name}
     mechanic.set(name, opened)

@@ -16,9 +16,6 @@ from confab.sim.arms import turn
 from confab.sim.collision import Solid
 from confab.sim.urdf import Array, UrdfModel, read_model, rotation
 
-WIDER = 0.25
-"""Share of the range from `opened` to the upper limit; a joint is opened by this share of the range beyond `opened`."""
-
 LONGEST, SLIM = 0.15, 0.7
 """Maximum length in metres of the drawn post behind a handle, and ratio of the post's width to the width of the handle's bar."""
 
@@ -64,16 +61,7 @@ def solids(mechanism: Mechanism, model: UrdfModel, values: Mapping[str, float], 
 
 def open_values(mechanism: Mechanism) -> dict[str, float]:
     """Return the joint values, by link, of a mechanism with all links open."""
-    return {link.name: wide(link) for link in mechanism.links}
-
-
-def wide(link: Link) -> float:
-    """Return the value to which a joint is opened, somewhat above the value at which the joint counts as open.
-
-    >>> wide(Link("lid", "revolute", opened=1.2, upper=1.6))
-    1.3
-    """
-    return link.opened + WIDER * (link.upper - link.opened)
+    return {link.name: link.wide for link in mechanism.links}
 
 
 def with_open_mechanisms(embodiment: Embodiment) -> tuple[dict[str, Place], list[Solid]]:

@@ -16,7 +16,7 @@ from confab.reasoner.embodiment.solid_checks import DEEP
 from confab.reasoner.embodiment.values import Link, Mechanism
 from confab.sim.bodies import load_written
 from confab.sim.collision import Solid
-from confab.sim.linkage import HERE, moved, read_mechanism, solids, urdf_name, wide, written
+from confab.sim.linkage import HERE, moved, read_mechanism, solids, urdf_name, written
 from confab.sim.urdf import Array, UrdfModel
 
 TRIP, STAY = 0.6, 0.3
@@ -73,7 +73,7 @@ class Mechanic:
     def set(self, name: str, opened: bool) -> None:
         """Set a link's joint open or shut, for the initial state and for interventions."""
         link = self.link(name)
-        value = wide(link) if opened else 0.0
+        value = link.wide if opened else 0.0
         pybullet.resetJointState(self.body, self.joints[name], value, physicsClientId=self.client)
         if link.latches:
             self.held[name] = opened

@@ -41,7 +41,7 @@ from confab.sim.stages import Stage, rises
 from confab.sim.swings import SAMPLES, check_swing
 from confab.sim.touch import FINGERS, ROOM, draw_back, go_around, off_centre, room
 from confab.sim.urdf import Array
-from confab.sim.verdict import REFUTED, SkillError
+from confab.sim.verdict import REFUTED, SkillError, named
 from confab.sim.whereabouts import arrived, floor_below, stopping
 
 LOOKS = 3
@@ -115,23 +115,27 @@ def _carry_out(run: Run, phase: Phase, later: Sequence[Phase]) -> None:
 
 
 def _lower(run: Run, phases: Iterable[Phase], motion: Callable[[], None]) -> None:
-    """Execute a motion; if a lifting motion is blocked, try lower heights in turn."""
+    """Execute a motion; if a lifting motion is blocked, try lower heights in turn.
+
+    The error names the bodies that block the motion at any of the heights, and has the message of the lowest height.
+    """
     if "least_raised" not in run.numbers or not any("raised" in phase.above for phase in phases):
         motion()
         return
-    given, first = run.numbers, None
-    for raised in rises(given):
+    given, blocking = run.numbers, list[str]()
+    for raised in (heights := rises(given)):
         run.numbers = {**given, "raised": raised}
         try:
             motion()
         except SkillError as failure:
-            if failure.verdict.code not in REFUTED:
+            verdict = failure.verdict
+            if verdict.code not in REFUTED:
                 raise
-            first = first or failure
+            blocking += verdict.objects
+            if raised == heights[-1]:
+                raise SkillError(verdict.code, named(*blocking), verdict.message, **verdict.measured) from failure
         else:
             return
-    assert first is not None
-    raise first
 
 
 def _with_looks(run: Run, phase: Phase, motion: Callable[[], None]) -> None:

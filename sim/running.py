@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from confab.reasoner.embodiment.skill_checks import JOINT_NUMBERS
 from confab.reasoner.embodiment.skills import evaluate
 from confab.reasoner.embodiment.values import Phase
 from confab.sim.attempt import Attempt
 from confab.sim.engine import Engine
 from confab.sim.features import FeatureFrame, Ways, locate, touched
-from confab.sim.linkage import wide
 from confab.sim.mechanisms import Mechanic
 from confab.sim.stages import Numbers
 from confab.sim.urdf import Array
@@ -62,6 +62,10 @@ class Run:
         if name in self.world.links:
             frame = locate(self.world, name, feature, values)
             return replace(frame, point=frame.point + self.world.shift(self.world.links[name]))
+        carrier = self.world.embodiment.places[name].carrier if name in self.world.embodiment.places else ""
+        if self.attempt.held and carrier in self.world.load(self.attempt.held):
+            message = f"{name} is a place of {carrier}, which the hand carries"
+            raise SkillError("goal in collision", named(name, self.attempt.held, carrier), message)
         if (name, feature) not in self.seen:
             self.seen[name, feature] = locate(self.world, name, feature)
         return self.seen[name, feature]
@@ -83,8 +87,7 @@ class Run:
             known["clear"] = self.clear()
         if link:
             one = self.world.links[link].link(link)
-            known |= {name: getattr(one, name) for name in ("opened", "shut", "lower", "upper")}
-            known["wide"] = wide(one)
+            known |= {name: getattr(one, name) for name in JOINT_NUMBERS}
         return evaluate(expression, known)
 
     def clear(self) -> float:

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from confab.reasoner.embodiment.skill_checks import JOINT_NUMBERS
 from confab.reasoner.embodiment.skills import evaluate
 from confab.reasoner.embodiment.values import PerceiverUse, SkillUse
 from confab.reasoner.refutations import Refutation
@@ -18,7 +19,6 @@ from confab.reasoner.symbols import Fact, Symbol
 from confab.sim.bodies import height_of, outline
 from confab.sim.collision import column
 from confab.sim.engine import Engine
-from confab.sim.linkage import wide
 from confab.sim.urdf import Array
 from confab.sim.verdict import SkillError
 
@@ -77,7 +77,7 @@ def _why(link: str, fact: Fact) -> str:
 def _moving(world: Engine, use: SkillUse, link: str) -> Iterator[str]:
     """Yield the roles in which a skill moves a link until the link is shut or opened."""
     one = world.links[link].link(link)
-    known = {"opened": one.opened, "shut": one.shut, "lower": one.lower, "upper": one.upper, "wide": wide(one)}
+    known = {name: getattr(one, name) for name in JOINT_NUMBERS}
     for phase in use.phases:
         role = phase.to.partition(".")[0]
         if phase.motion == "joint" and role in use.parameters and link in use.links.get(role, ()):

@@ -10,13 +10,16 @@ from itertools import pairwise
 
 from confab.reasoner.embodiment.values import Embodiment, Flaw, Shape
 
+ROOM = 0.002
+"""Least room in metres that a hand needs between its open fingers beside an object."""
+
 
 def too_wide(embodiment: Embodiment) -> Iterator[Flaw]:
     """Yield objects that are too wide for every hand."""
     openings = [2 * hand.opening for robot in embodiment.robots for hand in robot.hands]
     for name, body in embodiment.bodies.items():
         width = _width(body.shape)
-        if openings and width >= max(openings):
+        if openings and width > max(openings) - ROOM:
             yield (
                 name,
                 f"{name} is {width * 100:.1f} cm wide at its grasp height; the fingers of the widest hand open to "

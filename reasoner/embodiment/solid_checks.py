@@ -1,8 +1,8 @@
 """Validation rules on overlapping solids: joints moved through their range, and objects in the initial state.
 
 Each joint of a mechanism is moved from `lower` to `upper`. The moved links must not overlap the base of their mechanism,
-neighbouring links or furniture. A neighbouring link that can move may be shut or fully open. An overlap with a link that can move
-is a fault only if it occurs both when this link is shut and when it is open.
+neighbouring links or furniture. A neighbouring link that can move may be shut, or open as wide as a hand opens it. An overlap
+with a link that can move is a fault only if it occurs both when this link is shut and when it is open.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def _swept(mechanism: Mechanism, link: Link, around: Sequence[Block]) -> Iterato
     values = np.linspace(link.lower, link.upper, SAMPLES) if link.kind != "fixed" else np.zeros(1)
     met: list[Met] = []
     neighbours = [one for one in mechanism.links if one.name not in taken and one.kind != "fixed"]
-    opened = {one.name: one.upper for one in neighbours}
+    opened = {one.name: one.wide for one in neighbours}
     for value in values.tolist():
         shut = blocks_of(mechanism, {link.name: value})
         moving = [block for block in shut if block.owner in taken]
@@ -69,6 +69,8 @@ def _swept(mechanism: Mechanism, link: Link, around: Sequence[Block]) -> Iterato
             where = f" where the joint of {link.name} is at {value:.3g}"
             if begun != value:
                 where += f" (and from {begun:.3g} on)"
+            if other.owner in opened:
+                where += f", whether {other.owner} is shut or at {opened[other.owner]:.3g}, to which a hand opens it"
             remedy = (
                 f"move or shorten one of the two, or end the joint of {link.name} before they meet (e:lower, e:upper)"
             )

@@ -18,6 +18,9 @@ Color: TypeAlias = tuple[float, float, float, float]
 Flaw: TypeAlias = tuple[str, str, str, str]
 """A fault: IRI or short name of the node, the description, the consequence, and the remedy."""
 
+WIDER = 0.25
+"""Share of the range from `opened` to the upper limit; a joint is opened by this share of the range beyond `opened`."""
+
 
 @dataclass(frozen=True)
 class Hand:
@@ -164,6 +167,15 @@ class Link:
     latches: bool = False
     urdf_link: str = ""
     touches: tuple[str, ...] = field(default=(), repr=False)
+
+    @property
+    def wide(self) -> float:
+        """The value to which a hand opens the joint, somewhat above the value from which the joint counts as open.
+
+        >>> Link("lid", "revolute", opened=1.2, upper=1.6).wide
+        1.3
+        """
+        return self.opened + WIDER * (self.upper - self.opened)
 
 
 @dataclass(frozen=True)

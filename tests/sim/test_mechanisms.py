@@ -20,7 +20,7 @@ from confab.reasoner.symbols import Fact, Symbol
 from confab.scene import Scene
 from confab.sim import measuring, phases, touch
 from confab.sim.faults import displaced
-from confab.sim.linkage import posts, read_mechanism, solids, wide
+from confab.sim.linkage import posts, read_mechanism, solids
 from confab.sim.live import LiveWorld
 from confab.sim.skills import perform
 from confab.sim.staging import Perturbation
@@ -274,7 +274,7 @@ def test_the_model_of_a_mechanism_has_the_poses_of_physics() -> None:
             rotation, origin = mechanic.frame("door")
             bar = next(part for part in mechanic.link("door").parts if part.name == "door.bar")
             np.testing.assert_allclose(solid.center, origin + rotation @ np.array(bar.position), atol=1e-9)
-        assert mechanic.values()["door"] == pytest.approx(wide(mechanic.link("door")))
+        assert mechanic.values()["door"] == pytest.approx(mechanic.link("door").wide)
     assert read_mechanism(mechanism).parents["door"].kind == "revolute"
 
 

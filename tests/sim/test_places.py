@@ -11,9 +11,12 @@ import pytest
 import confab
 from confab.reaching import with_reach
 from confab.scene import Scene
+from confab.sim.attempt import Attempt
 from confab.sim.faults import stranger
 from confab.sim.rollouts import Trial
+from confab.sim.running import Run
 from confab.sim.staging import Perturbation
+from confab.sim.verdict import REFUTED, SkillError
 from confab.sim.verify import expectations
 from confab.sim.world import PhysicsWorld
 
@@ -127,6 +130,24 @@ def test_a_collision_is_reported_with_the_body_the_millimetres_and_the_phase(tmp
     assert re.search(r"goal in collision: .*\d mm (inside|from) stranger in reach\.\w+, wanted 3 mm", str(verdict)), (
         verdict
     )
+
+
+def test_all_bodies_that_block_a_hand_at_some_height_are_reported(tmp_path: Path) -> None:
+    one = scene("shelf", tmp_path)
+    with PhysicsWorld(one.embodiment, one.problem.initial) as world:
+        stranger((0.5, 0.1, 0.7), (0.07, 0.3, 0.12))(world)
+        verdict = world.execute(one.plan().plan.primitives[0])
+    assert {"shelf", "stranger"} <= {*verdict.objects}, verdict
+
+
+def test_a_place_of_the_load_is_no_place_for_the_load(tmp_path: Path) -> None:
+    one = scene("stack", tmp_path)
+    with PhysicsWorld(one.embodiment, one.problem.initial) as world:
+        holding = replace(Attempt.begin(world, "left_hand"), held="b")
+        run = Run(holding, {"target": "p4"}, {})
+        with pytest.raises(SkillError, match="p4 is a place of b, which the hand carries") as raised:
+            run.at("target")
+    assert raised.value.verdict.code in REFUTED
 
 
 def test_motion_planning_uses_the_actual_width_of_a_box(tmp_path: Path) -> None:
