@@ -14,7 +14,7 @@ from inspect import getattr_static, signature
 from types import FunctionType
 from typing import TYPE_CHECKING, NoReturn, ParamSpec, TypeVar
 
-from confab.reasoner.limits import Deadline, within
+from confab.reasoner.limits import Deadline, check, within
 
 C = TypeVar("C", bound=type)
 P = ParamSpec("P")
@@ -34,10 +34,14 @@ class Names:
 
     def __init__(self, iris: Iterable[str]) -> None:
         by_local = defaultdict(list)
-        for iri in set(iris):
+        for count, iri in enumerate(set(iris)):
+            if not count % 4096:
+                check("reading the scene")
             by_local[local_name(iri)].append(iri)
         self._iris: dict[str, str] = {}
-        for local, group in by_local.items():
+        for count, (local, group) in enumerate(by_local.items()):
+            if not count % 4096:
+                check("reading the scene")
             for iri in sorted(group):
                 name = local if len(group) == 1 else f"{_ontology_name(iri)}:{local}"
                 self._iris[name if name not in self._iris else iri] = iri
