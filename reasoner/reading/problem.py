@@ -42,9 +42,11 @@ SELECT DISTINCT ?individual ?class ?index WHERE {
 }"""
 FACTS = """
 SELECT DISTINCT ?subject ?property ?object WHERE {
-  { ?situation :valueProperty ?property } UNION { ?property a/rdfs:subClassOf* :Relation }
+  { SELECT DISTINCT ?property {
+      { ?situation :valueProperty ?property } UNION { ?property a/rdfs:subClassOf* :Relation } } }
   ?subject ?property ?object .
 }"""
+"""The query has an inner query, because a store would otherwise join its properties with all triples."""
 TUPLES = """
 SELECT DISTINCT ?fact ?property ?value WHERE {
   ?fact a :SituatedObjectInstance ; ?property ?value
