@@ -240,11 +240,14 @@ class Agenda:
     def restart(self, level: int) -> bool:
         """Achieve all goals together from the initial state, after a dead end; return whether that succeeded.
 
-        On failure, restore the previous steps. During the restart, refinements avoid changes of symbols that no upper level
-        sees. Otherwise a goal could become unreachable without a visible change on an upper level.
+        If the level sees no sleeping goal, there is no attempt. On failure, restore the previous steps. During the restart,
+        refinements avoid changes of symbols that no upper level sees. Otherwise a goal could become unreachable without a visible
+        change on an upper level.
         """
         call, refiner = self.call, self.call.refiner
         if not call.steps or self.trial or self._restarted or level != call.program.levels[0]:
+            return False
+        if not any(call.space.visible(level, cell) for cell in self._asleep):
             return False
         self._restarted = True
         steps, given_up, kept = call.steps, call.given_up, call.kept

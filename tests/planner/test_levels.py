@@ -6,6 +6,7 @@ from itertools import product
 
 import pytest
 
+import confab
 from confab.planner.grounded.best_first import plan_level
 from confab.planner.grounded.grounding import ground
 from confab.planner.grounded.task import Task
@@ -201,6 +202,14 @@ def test_a_shorter_order_of_goals_also_achieves_the_goals_that_level_1_does_not_
     outcome = default(problem)
     assert outcome.plan is not None
     assert validate(problem, outcome.plan) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "goal"), [("library-small", "cart BRAKE released"), ("house-small", "study_door DOOR open")]
+)
+def test_a_goal_that_only_a_lower_level_sees_needs_no_new_refinements_on_the_first_level(name: str, goal: str) -> None:
+    scene = confab.load(name)
+    assert scene.plan(goal, engine="none").outcome.misses == scene.plan(engine="none").outcome.misses
 
 
 def test_a_refinement_that_was_found_in_a_state_is_not_searched_again_in_this_state() -> None:
