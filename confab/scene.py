@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from os import PathLike
@@ -381,11 +382,18 @@ def load_text(content: bytes) -> Scene:
     with TemporaryDirectory() as folder:
         file = Path(folder, "stdin.trig")  # Turtle is also TriG
         file.write_bytes(content)
+
+        def said(fault: object) -> str:
+            text = re.sub(
+                r"put its file beside .*", "a scene from stdin can import only shipped ontologies", str(fault)
+            )
+            return text.replace(f"{folder}/", "")
+
         try:
             graph = load_graph(file, tolerant=True)
         except KnowledgeError as error:
-            raise KnowledgeError(str(error).replace(f"{folder}/", "")) from error
-        graph.faults[:] = [fault.replace(f"{folder}/", "") for fault in graph.faults]
+            raise KnowledgeError(said(error)) from error
+        graph.faults[:] = map(said, graph.faults)
     graph.files.pop(graph.scene, None)
     try:
         infer(graph)

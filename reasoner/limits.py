@@ -68,6 +68,8 @@ def within(limit: Deadline | float | None) -> Iterator[Deadline]:
     ...     deadline.seconds
     60.0
     """
+    if isinstance(limit, str) or limit != limit:  # NaN would be no limit
+        raise TypeError(f"within({limit!r}): wanted seconds as a number, e.g. 5")
     new = limit if isinstance(limit, Deadline) else Deadline.after(limit)
     earliest = min(_current.get(), new, key=lambda one: one.at)
     token = _current.set(earliest)

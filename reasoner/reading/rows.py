@@ -147,13 +147,16 @@ def link(row: Sequence[Term], blank: bool = False) -> Triple:
         raise KnowledgeError(
             f"<{text(subject)}>: {said} belongs to an ontology, not to an individual; move it beside owl:imports"
         )
-    for term in (subject, value):
-        if not (isinstance(term, ox.NamedNode) or (blank and isinstance(term, ox.BlankNode))):
-            what = f"the text '{text(term)[:60]}'" if isinstance(term, ox.Literal) else "a node without a name"
-            raise KnowledgeError(
-                f"<{text(subject)}>: {local_name(text(predicate))} has {what} as its value; name an individual instead"
-                + (", without quotation marks" if isinstance(term, ox.Literal) else "")
-            )
+    if (
+        isinstance(subject, ox.BlankNode) and not blank
+    ):  # the message has no ID of the node, which differs in each process
+        raise KnowledgeError(f"a node without a name has a value of {local_name(text(predicate))}; name the individual")
+    if not (isinstance(value, ox.NamedNode) or (blank and isinstance(value, ox.BlankNode))):
+        what = f"the text '{text(value)[:60]}'" if isinstance(value, ox.Literal) else "a node without a name"
+        raise KnowledgeError(
+            f"<{text(subject)}>: {local_name(text(predicate))} has {what} as its value; name an individual instead"
+            + (", without quotation marks" if isinstance(value, ox.Literal) else "")
+        )
     return text(subject), text(predicate), text(value)
 
 

@@ -368,6 +368,13 @@ def test_an_invalid_scene_is_refused_in_one_line_by_plan_and_by_validate(
     assert ask("validate", tearoom)[0] == 1
 
 
+def test_the_message_on_an_individual_without_a_name_is_the_same_in_every_call(tearoom: Path, ask: Ask) -> None:
+    change(tearoom.with_name("tearoom-scene.ttl"), ":plate1 a ", "[] a d:Plate ; d:isAt :shelf . :plate1 a ")
+    said = {ask("plan", tearoom)[2] for _ in range(2)}
+    assert len(said) == 1
+    assert "a node without a name has a value of isAt; name the individual" in said.pop()
+
+
 @pytest.mark.parametrize("index", ['"one"', "1.5", "1" + "0" * 5000])
 def test_an_index_that_is_no_whole_number_is_refused_where_a_robot_has_a_body(
     tmp_path: Path, ask: Ask, index: str

@@ -1,6 +1,7 @@
 """Every command with `--time-limit`, and every call inside `confab.within`, ends at its time limit."""
 
 import json
+import math
 from collections.abc import Callable
 from pathlib import Path
 from time import process_time
@@ -157,3 +158,9 @@ def test_explaining_a_plan_is_within_the_limit_of_planning_it(monkeypatch: pytes
     monkeypatch.setattr(Result, "explain", watched)
     confab.load("beverage-serving").explain(time_limit=60.0)
     assert held == [60.0]
+
+
+@pytest.mark.parametrize("limit", ["5", math.nan])
+def test_a_time_limit_of_a_block_that_is_no_number_is_refused(limit: float) -> None:
+    with pytest.raises(TypeError, match="wanted seconds as a number"), confab.within(limit):
+        pass
