@@ -6,10 +6,9 @@ import math
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict
+from typing import TYPE_CHECKING, Any, TypedDict
 
 from confab.accepting import AnyPlan, Facts, check_goal, check_seconds, number, plan_of, possible, several
 from confab.formats import EpisodeJson, SeenJson
@@ -20,7 +19,7 @@ from confab.planner.acting.failure_memory import Caution
 from confab.planner.acting.retries import RetryPolicy
 from confab.planner.acting.symbolic_world import SymbolicWorld, place_symbols
 from confab.planner.acting.world import World
-from confab.planner.plan import Plan, Planner, Step, renumbered
+from confab.planner.plan import Plan, Planner, SoftGoal, Step, renumbered
 from confab.planner.solve import DEFAULT_MODE, Mode
 from confab.planner.validation import open_goals
 from confab.reasoner.amounts import written
@@ -317,14 +316,6 @@ def _situated(symbol: Symbol, value: str | None, seconds: float) -> SeenJson:
 
 
 # -------------------------------------------------------------------------------------------------------------- public functions
-
-
-class SoftGoal(NamedTuple):
-    """A soft goal of an executed task, with its weight, and whether the goal held in the end."""
-
-    fact: Fact
-    weight: Fraction
-    met: bool
 
 
 @right_names("an execution", "scene.execute() or scene.read_episode(FILE)")

@@ -167,7 +167,7 @@ def _differences(one: Run, other: Run) -> Iterator[tuple[str, str, str]]:
     ends = [{goal["label"]: goal.get("after", "") for goal in run.page["goals"]} for run in (one, other)]
     for goal in dict.fromkeys((*ends[0], *ends[1])):
         if ends[0].get(goal) != ends[1].get(goal):
-            yield f"in the end ({goal})", ends[0].get(goal, "not a goal"), ends[1].get(goal, "not a goal")
+            yield f"in the end ({goal})", ends[0].get(goal, "not pursued"), ends[1].get(goal, "not pursued")
 
 
 def history_html(those: Sequence[Run], title: str, names: Sequence[str] = ()) -> str:

@@ -17,7 +17,7 @@ from confab.interchange import outcome_json
 from confab.known import Known
 from confab.plan_call import planned, read_task
 from confab.plan_options import PlanOptions
-from confab.planner.plan import Outcome, Plan, Status, Step, paused_collection, renumbered
+from confab.planner.plan import Outcome, Plan, SoftGoal, Status, Step, paused_collection, renumbered
 from confab.planner.solve import DEFAULT_MODE, Mode, Request, solve
 from confab.planner.validation import Fault, validate
 from confab.reasoner.graph.knowledge import KnowledgeError
@@ -209,6 +209,13 @@ class Result(metaclass=RightNames):
             raise KnowledgeError(f"there is no plan ({self.outcome.status.value}): {reason}")
         return self.outcome.plan
 
+    @property
+    def soft_goals(self) -> tuple[SoftGoal, ...]:
+        """The soft goals of the task, the heaviest first."""
+        task, unmet = with_goals((self.part or self.scene.reading).problem, self.goals), self.outcome.unmet
+        found = [SoftGoal(Fact(s, task.goal[s]), weight, s not in unmet) for s, weight in task.weights.items()]
+        return tuple(sorted(found, key=lambda one: (-one.weight, one.fact.symbol)))
+
     def __bool__(self) -> bool:
         """Return whether there is a plan."""
         return self.solved
@@ -365,8 +372,7 @@ class Result(metaclass=RightNames):
                 return self.in_whole_scene().why_not(asked, instead)
             labels = self.labels
             place = None if instead is None else find_step(self.plan, instead, labels)
-            task = with_goals(self.scene.problem, self.goals)
-            soft = {Fact(symbol, task.goal[symbol]): weight for symbol, weight in task.weights.items()}
+            soft = {goal.fact: goal.weight for goal in self.soft_goals}
             try:
                 told = why_not(asked, self.problem, self.plan, labels, ask, replan, place, soft)
             except KnowledgeError:  # possibly only the whole scene has an individual of the text

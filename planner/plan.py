@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from fractions import Fraction
 from time import perf_counter
-from typing import TYPE_CHECKING, Literal, Protocol, overload
+from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol, overload
 
 from confab.planner.certificates import Certificate
 from confab.reasoner.amounts import written
@@ -320,6 +320,14 @@ class Left:
     first: tuple[int, ...]
     last: tuple[int, ...]
     broken: tuple[Broken, ...]
+
+
+class SoftGoal(NamedTuple):
+    """A soft goal of a task, with its weight, and whether the goal holds in the end."""
+
+    fact: Fact
+    weight: Fraction
+    met: bool
 
 
 @dataclass(frozen=True)

@@ -76,6 +76,8 @@ def page_data(
     notes = execution.notes() if execution is not None else report.notes() if report is not None else {}
     calm = execution is None or not (execution.episode.interventions or execution.episode.failures)
     data = timeline_data(scene, timeline, labels, notes, reasons=calm)
+    ended = execution if execution is not None else result
+    soft = () if ended is None else ended.soft_goals
     good, status = status_of(outcome, report, execution)
     data |= {
         "good": good,
@@ -87,7 +89,7 @@ def page_data(
         else summary(outcome).splitlines()[0]
         if outcome is not None
         else "",
-        "tiles": tiles_of(problem, timeline if planned else None, outcome, report, execution),
+        "tiles": tiles_of(problem, timeline if planned else None, outcome, report, execution, soft),
         "goals": goals_of(timeline, labels, planned),
         "notes": [
             *data["notes"],

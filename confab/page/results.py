@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from base64 import b64encode
+from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
 from shlex import join
@@ -14,7 +15,7 @@ from confab.page.lanes import id_of
 from confab.page.markup import measurement, number, plain
 from confab.page.schema import Alarm, Film, GoalData, Tile
 from confab.page.timeline import Timeline
-from confab.planner.plan import Outcome, Status
+from confab.planner.plan import Outcome, SoftGoal, Status
 from confab.planner.plan_costs import cost_of
 from confab.reasoner.symbols import FALSE, Fact, Problem
 from confab.show import lengths
@@ -38,6 +39,10 @@ class Planned(Protocol):
     outcome: Outcome
     timed: TimedPlan | None
 
+    @property
+    def soft_goals(self) -> tuple[SoftGoal, ...]:
+        """The soft goals of the task."""
+
     def dearer(self) -> str:
         """Return a remark on possible cheaper plans, as `confab.planning.Result.dearer`."""
 
@@ -52,6 +57,10 @@ class Executed(Protocol):
     @property
     def reached(self) -> bool:
         """Whether the execution reached all goals."""
+
+    @property
+    def soft_goals(self) -> tuple[SoftGoal, ...]:
+        """The soft goals of the task."""
 
     def notes(self) -> dict[tuple[int, ...], str]:
         """Return notes on steps, by the step's path."""
@@ -77,6 +86,7 @@ def tiles_of(
     outcome: Outcome | None,
     report: Report | None,
     execution: Executed | None,
+    soft: Sequence[SoftGoal] = (),
 ) -> list[Tile]:
     """Return the figures of a run, such as the number of primitives and the planning time."""
     found: list[tuple[str, str]] = []
@@ -108,10 +118,13 @@ def tiles_of(
         found.append(
             ("planning", f"{outcome.seconds:.1f} s" if outcome.seconds >= 1 else f"{outcome.seconds * 1000:.0f} ms")
         )
-        if outcome.plan is not None:
-            cost = cost_of(problem, outcome.plan)
-            if cost != len(outcome.plan.primitives):
-                found.append(("cost", number(cost)))
+        costly = any(one.price is not None or one.cost != 1 for one in problem.domain.behaviors.values())
+        if outcome.plan is not None and costly:
+            found.append(("cost", number(cost_of(problem, outcome.plan))))
+    if soft and timeline is not None:
+        unmet = sum(float(goal.weight) for goal in soft if not goal.met)
+        met = f"{sum(goal.met for goal in soft)} of {len(soft)} met"
+        found.append(("soft goals", f"{met}, unmet weight {number(unmet)}" if unmet else met))
     return [{"name": name, "text": text} for name, text in found]
 
 

@@ -85,7 +85,7 @@ def ontology_of(episode: Data, name: str) -> str:
 def triples_of(episode: Data, names: Names, name: str = "episode") -> Iterator[ox.Triple]:
     """Yield the triples of an episode, in the order of its events."""
     describe = _Describe(ontology_of(episode, name) + "#", names)
-    whole = describe.node("whole")
+    whole = describe.node(f"episode_{as_iri_part(name)}")
     seconds = episode["seconds"]
     yield from describe.individual(
         whole, "Episode", status=episode["status"], began=0.0, ended=seconds.get("simulated", 0.0)

@@ -195,6 +195,9 @@ def test_several_saved_episodes_can_be_queried_together(tmp_path: Path) -> None:
     course = [row for row in both.query(ready("how-did-it-go-on")) if row[1] == "cup2" and row[2] == "LOCATION"]
     calm, visit = ["location1", "in_hand", "location5"], ["location1", "in_hand", "location5", "location8"]
     assert [row[5] for row in course] == calm + visit
+    assert [str(row[0]).rpartition("#")[2] for row in course] == ["episode_calm"] * len(calm) + ["episode_visit"] * len(
+        visit
+    )
     assert not both.query(ready("what-failed"))
     with pytest.raises(KnowledgeError, match="both contain"):
         both.with_episodes(tmp_path / "calm.ttl", tmp_path / "calm.ttl")

@@ -12,7 +12,8 @@ from click.testing import CliRunner
 import confab
 from confab import ontology
 from confab.cli import app
-from confab.history import compared, new_folder, runs
+from confab.history import compared, new_folder, record, runs
+from confab.page.data import page_data
 from confab.sim.rollouts import Trial
 from confab.sim.verify import Rollout
 
@@ -98,6 +99,15 @@ def test_noise_reaches_physics(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_noise_is_refused_in_a_world_without_measurements() -> None:
     with pytest.raises(confab.KnowledgeError, match="only in the world pybullet"):
         confab.load("towers-small").execute(noise=0.001)
+
+
+def test_a_comparison_of_runs_has_costs_and_soft_goals(tmp_path: Path) -> None:
+    scene = confab.load("wishes-small")
+    for goals in ((), ("store STOCK 0",)):
+        record(new_folder(tmp_path), page_data(scene, scene.plan(goals)), {"goals": goals}, "")
+    found = {row[0]: row[1:] for row in compared(runs(tmp_path), "001", "002")}
+    assert found["soft goals"] == ("1 of 2 met, unmet weight 8", "1 of 1 met")
+    assert float(str(found["cost"][0])) < float(str(found["cost"][1]))
 
 
 def test_runs_that_are_kept_are_listed_compared_and_shown(tmp_path: Path) -> None:
