@@ -9,7 +9,7 @@ class                     properties
 `:ValueCondition`         ``:situationType``, arguments, ``:value`` `:RelationCondition`      ``:relation``, arguments; the last
 of several arguments is the ``:value`` `:ClassCondition`         ``:about``, ``:ofClass`` `:EqualityCondition`      ``:about``,
 ``:value`` `:Witness`                ``:witness`` (the variable), ``:condition`` for each condition `:AnyOf`
-``:alternative`` for each condition or `:AllOf` `:AllOf`                  ``:condition`` for each condition `:Comparison`
+``:alternative`` for each condition or `:AllOf`; ``:enforces`` and arguments if it enforces a constraint `:AllOf`                  ``:condition`` for each condition `:Comparison`
 ``:sign``; left side: an amount or ``:left``; right side: ``:amount`` or ``:right`` `:Calculation`            those of a
 comparison, or only an amount, or only ``:amount`` `:ValueEffect`            those of a value condition, ``:when`` for each
 condition `:AmountEffect`           an amount, ``:change``, ``:amount`` or ``:right``, ``:when`` for each condition
@@ -35,6 +35,7 @@ from confab.reasoner.symbols import (
     ClassCondition,
     Comparison,
     Condition,
+    Constraint,
     Effect,
     EqualityCondition,
     Parameter,
@@ -49,11 +50,13 @@ Node: TypeAlias = "Mapping[str, Sequence[str]]"
 """The values of a node by the IRI of the property; values are IRIs or the text of literals."""
 Properties: TypeAlias = "dict[str, list[str]]"
 """The values of a node by the name of the property in the core."""
-STRINGS = ("sign", "change", "aggregate")
+STRINGS = ("sign", "change", "aggregate", "enforces")
 """Properties whose values are words."""
 LITERALS = {"negated": "boolean", "amount": "decimal", "index": "integer"}
 """Properties whose values are literals but not words, each with the datatype of its values."""
 SIGNS = ("+", "-", "*", "/")
+ENFORCED = ("never", "always", "atMostOnce", "onlyAfter")
+"""The core's properties that state constraints; the last two are about the situation types in `Constraint.about`."""
 DEEPEST = 50
 """Maximum depth of nested conditions and calculations. Conjunctions (`:AllOf`) don't count as levels."""
 MOST_CONDITIONS = 10_000
@@ -99,6 +102,13 @@ def triples(node: ox.NamedNode | ox.BlankNode, properties: Properties) -> Iterat
         prop = ox.NamedNode(name if name == TYPE else CORE + name)
         for value in values:
             yield ox.Triple(node, prop, _object(name, value))
+
+
+def constraint_properties(constraint: Constraint, spelled: Callable[[str], str]) -> Properties:
+    """Return the properties that state which constraint a condition enforces."""
+    about = constraint.about or (constraint.situation,)
+    word = ENFORCED[1 + len(about)] if constraint.about else ENFORCED[constraint.always]
+    return {"enforces": [word], **argument_properties([*map(spelled, about)])}
 
 
 def _object(name: str, value: str) -> ox.NamedNode | ox.Literal:
@@ -199,8 +209,9 @@ class NodeWriter:
                 self.nodes.append(self.statement(sought, "Variable", {"termType": [self.spelled(of)]}))
                 kind, properties = "Witness", {"witness": [sought], "condition": [*map(self.condition, conditions)]}
                 self.terms = before
-            case AnyOf(alternatives):
-                kind, properties = "AnyOf", {"alternative": self.groups(alternatives, node)}
+            case AnyOf(alternatives, _, constraint):
+                enforced = {} if constraint is None else constraint_properties(constraint, self.spelled)
+                kind, properties = "AnyOf", {"alternative": self.groups(alternatives, node), **enforced}
             case Comparison(left, sign, right):
                 kind = "Comparison"
                 properties = {"sign": [sign], **self.side("left", left), **self.side("right", right)}
@@ -415,13 +426,21 @@ class NodeReader:
             variable, more = self.sought(self.one(iri, "witness"))
             return Witness(variable.name, variable.kind, (*self.conditions(iri, "condition"), *more), negated)
         if self.is_a(iri, "AnyOf"):
-            return AnyOf(self.in_order(map(self.group, self.values(iri, "alternative"))), negated)
+            alternatives = self.in_order(map(self.group, self.values(iri, "alternative")))
+            return AnyOf(alternatives, negated, self.constraint(iri))
         if self.is_a(iri, "AllOf"):
             return AnyOf((self.conditions(iri, "condition"),), negated)
         if self.is_a(iri, "Comparison"):
             sign = self.word(iri, "sign", tuple(COMPARING))
             return Comparison(self.left(iri), sign, self.right(iri), negated)
         raise self.error(f"<{iri}>: a condition of no known kind; give it one of the subclasses of c:Condition")
+
+    def constraint(self, iri: str) -> Constraint | None:
+        """Return the constraint that a condition enforces, or None."""
+        if not self.values(iri, "enforces"):
+            return None
+        word, situation = self.word(iri, "enforces", ENFORCED), self.short(self.one(iri, "about"))
+        return Constraint(situation, word == "always", self.arguments(iri) if word in ENFORCED[2:] else ())
 
     def conditions(self, iri: str, name: str) -> tuple[Condition, ...]:
         """Return the conditions that are the values of a node's property."""

@@ -181,7 +181,9 @@ def test_a_memory_of_a_world_is_saved_and_read_again(name: str, tmp_path: Path) 
     memory = confab.Memory.of(world)
     memory.teach(world, world.plan())
     memory.save(tmp_path / "memory.ttl")
-    assert confab.Memory.load(tmp_path / "memory.ttl", world).experience == memory.experience
+    read = confab.Memory.load(tmp_path / "memory.ttl", world)
+    assert read.experience == memory.experience
+    assert read.page() == memory.page()
     assert unknown_terms(memory_lines(tmp_path / "memory.ttl"), world) == []
 
 
