@@ -9,11 +9,13 @@ class                     properties
 `:ValueCondition`         ``:situationType``, arguments, ``:value`` `:RelationCondition`      ``:relation``, arguments; the last
 of several arguments is the ``:value`` `:ClassCondition`         ``:about``, ``:ofClass`` `:EqualityCondition`      ``:about``,
 ``:value`` `:Witness`                ``:witness`` (the variable), ``:condition`` for each condition `:AnyOf`
-``:alternative`` for each condition or `:AllOf`; ``:enforces`` and arguments if it enforces a constraint `:AllOf`                  ``:condition`` for each condition `:Comparison`
+``:alternative`` for each condition or `:AllOf` `:AllOf`                  ``:condition`` for each condition `:Comparison`
 ``:sign``; left side: an amount or ``:left``; right side: ``:amount`` or ``:right`` `:Calculation`            those of a
 comparison, or only an amount, or only ``:amount`` `:ValueEffect`            those of a value condition, ``:when`` for each
 condition `:AmountEffect`           an amount, ``:change``, ``:amount`` or ``:right``, ``:when`` for each condition
 ========================  =====================================================================
+
+An `:AnyOf` that enforces a constraint also has ``:enforces`` (`ENFORCED`), with the constrained situation types as arguments.
 
 Arguments are ``:about``, ``:argument2`` and so on (`ARGUMENTS`). An amount is stated by a situation type with its arguments, or by
 a relation with all of its arguments except the number.

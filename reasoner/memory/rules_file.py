@@ -99,9 +99,7 @@ class RuleWriter:
                 of = "".join(f" ; :{a} {roles[j]}" for a, j in zip(ARGUMENTS, role.source[1], strict=False))
                 said += f" ; :isValueOf {self.term(role.source[0])}{of}"
             lines.append(said + (f" ; :becomesValueOf {self.term(role.becomes)}" if role.becomes is not None else ""))
-        lines += [
-            f"{role} a owl:NamedIndividual, :Parameter ; :index {i}" for i, role in enumerate(roles[: method.roles])
-        ]
+        lines += [f"{role} a owl:NamedIndividual ; :index {i}" for i, role in enumerate(roles[: method.roles])]
         for i, (name, places) in enumerate(method.steps):
             terms = [roles[place] for place in places]
             does = self.step((name, terms), dict(zip(terms, terms, strict=True)))

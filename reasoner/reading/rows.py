@@ -40,7 +40,7 @@ DATA = frozenset(
         "weight",
     )
 )
-DATA |= {CORE + name for name in ("amount", "sign", "change", "aggregate", "unit", "wholeNumbers")}
+DATA |= {CORE + name for name in ("amount", "sign", "change", "aggregate", "enforces", "unit", "wholeNumbers")}
 DATA |= {CORE + name for name in ("leastAmount", "mostAmount", "defaultAmount")}
 DATA |= {CORE + name for name in ("duration", "by", "happensAt", "availableFrom", "availableUntil")}
 """Core properties whose values are literals; the values of all other core properties are nodes."""

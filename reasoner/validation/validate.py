@@ -33,6 +33,8 @@ from confab.reasoner.embodiment.reading import read_embodiment
 from confab.reasoner.files import silent_about_numbers
 from confab.reasoner.graph.inference import infer
 from confab.reasoner.graph.knowledge import BASE, GRAPHS, KnowledgeError, KnowledgeGraph, load, scene_file, text
+from confab.reasoner.memory.experience_file import parse
+from confab.reasoner.memory.links_file import memory_lines
 from confab.reasoner.names import local_name
 from confab.reasoner.reading.problem import Reading, read
 from confab.reasoner.updates.compiling import Fault
@@ -162,6 +164,9 @@ def _validate_one(file: str | Path, deep: bool, done: Callable[[str], object]) -
         yield Finding(str(path), 0, "", "", "unreadable", said, why, "see the message")
         return
     places = Places(graph)
+    if graph.select("SELECT ?memory { ?memory :memoryFormat ?format }"):
+        yield from _in_memory(path, graph, places)
+        return
     for fault in faults:
         why = "a behaviour whose update can't be read has no effect"
         yield places.in_update("update", fault.place, fault.what, why, fault.remedy)
@@ -194,6 +199,22 @@ def _validate_one(file: str | Path, deep: bool, done: Callable[[str], object]) -
 
         for rule, node, what, why, remedy in deep_faults(graph):
             yield places.finding(rule, node, what, why, remedy)
+
+
+def _in_memory(path: Path, graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
+    """Yield the findings in a memory file: undeclared terms, wrong forms, and parts that planning can't read."""
+    case = Case(graph, None)
+    found = [places.finding("undeclared-term", *fault) for fault in RULES["undeclared-term"](case)]
+    found += _sure([*_ill_formed(graph, places)], case)
+    yield from found
+    try:
+        parse(memory_lines(path), str(path))
+    except KnowledgeError as error:
+        if not found:
+            why = "planning continues without the memory"
+            yield Finding(
+                str(path), 0, "", "", "unreadable", str(error).removeprefix(f"{path}: "), why, "see the message"
+            )
 
 
 def _extending(graph: KnowledgeGraph, behaviors: set[str]) -> set[str]:

@@ -61,11 +61,14 @@ def test_a_memory_that_is_edited_without_its_scene_keeps_its_terms(tmp_path: Pat
     memory = confab.Memory.of(scene)
     memory.teach(scene, scene.plan())
     memory.save(file)
+    assert not confab.validate(file)
     confab.Memory.of(scene).save(other)
     for arguments in (["trust", file, "all"], ["merge", file, other, "-o", file]):
         assert CliRunner().invoke(app, ["memory", *map(str, arguments)]).exit_code == 0
         assert unknown_terms(memory_lines(file), scene) == []
     assert confab.Memory.load(file, scene).experience.said == memory.experience.said
+    file.write_text(file.read_text().replace("#Movable>", "#Movabel>").replace(":learnsAs", ":learns"))
+    assert "undeclared-term" in {finding.rule for finding in confab.validate(file)}
 
 
 def test_the_papers_links_are_read_for_the_papers_mode_alone(tmp_path: Path, scene: confab.Scene) -> None:
