@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import product
 
 from confab.reasoner.amounts import Measure, written
@@ -15,7 +15,7 @@ from confab.reasoner.possible import values_at_fault
 from confab.reasoner.reading.definitions import Definitions
 from confab.reasoner.reading.goals import check_arguments
 from confab.reasoner.reading.parts import Parts
-from confab.reasoner.symbols import TRUE, Domain, RelationCondition, State, Symbol
+from confab.reasoner.symbols import TRUE, Domain, RelationCondition, SituationType, State, Symbol
 from confab.reasoner.vocabulary import CORE
 
 
@@ -125,6 +125,23 @@ def _check_numbers(relation: str, rows: Iterable[tuple[str, ...]], bare: Collect
             raise KnowledgeError(f"{relation} of {', '.join(individuals)} is {old} and {value}; state one number")
 
 
+def _of_two_classes(
+    domain: Domain, classes: Mapping[str, tuple[str, ...]], situation: SituationType, arguments: Sequence[str]
+) -> str:
+    """Return the advice to drop the class that has a situation type, if an individual also belongs to an unrelated class."""
+    for individual, kind in zip(arguments, situation.arguments, strict=True):
+        own = {*classes[kind]}
+        others = [
+            other
+            for other, members in classes.items()
+            if individual in members and other not in domain.situations and {*members} - own and own - {*members}
+        ]
+        if others:
+            least = min(others, key=lambda other: (len(classes[other]), other))
+            return f"{individual} is a {kind}, which has {situation.name}, and a {least}: drop one of the two classes, "
+    return ""
+
+
 def initial_state(
     domain: Domain, classes: Mapping[str, tuple[str, ...]], stated: Mapping[Symbol, set[str]], names: Names
 ) -> dict[Symbol, str]:
@@ -143,8 +160,9 @@ def initial_state(
             values = sorted(stated.get(symbol, ())) or [v for v in [situation.default] if v]
             if len(values) != 1:
                 what = f"several values ({', '.join(values)})" if values else "no value"
+                wrong = "" if values else _of_two_classes(domain, classes, situation, arguments)
                 raise KnowledgeError(
-                    f"{symbol} has {what}; state a value in the scene, or a default of {situation.name}"
+                    f"{symbol} has {what}; {wrong}state a value in the scene, or a default of {situation.name}"
                 )
             initial[symbol] = values[0]
     members = {kind: frozenset(those) for kind, those in classes.items()}

@@ -16,9 +16,9 @@ from confab.reasoner.graph.knowledge import SCENE, text
 from confab.reasoner.names import local_name, nearest
 from confab.reasoner.reading.swrl import SWRL
 from confab.reasoner.validation.case import Case, Fault
-from confab.reasoner.vocabulary import OWL, RDF, RDFS, XSD
+from confab.reasoner.vocabulary import MEMORY, OWL, RDF, RDFS, XSD
 
-BUILT_IN = (OWL, RDF, RDFS, XSD, SWRL, SWRL.replace("swrl#", "swrlb#"))
+BUILT_IN = (OWL, RDF, RDFS, XSD, SWRL, SWRL.replace("swrl#", "swrlb#"), MEMORY)
 ATOMS = (SWRL + "argument1", SWRL + "argument2")
 OF_A_RULE = "a variable or an individual of a SWRL rule"
 OF_CLASSES = {RDF + "type", RDFS + "subClassOf", SWRL + "classPredicate"}

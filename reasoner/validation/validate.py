@@ -205,7 +205,7 @@ def _in_memory(path: Path, graph: KnowledgeGraph, places: Places) -> Iterator[Fi
     """Yield the findings in a memory file: undeclared terms, wrong forms, and parts that planning can't read."""
     case = Case(graph, None)
     found = [places.finding("undeclared-term", *fault) for fault in RULES["undeclared-term"](case)]
-    found += _sure([*_ill_formed(graph, places)], case)
+    found += _sure([*_violations(graph, places), *_ill_formed(graph, places)], case)
     yield from found
     try:
         parse(memory_lines(path), str(path))

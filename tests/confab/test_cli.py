@@ -151,6 +151,12 @@ def test_a_query_gives_table_csv_and_json() -> None:
     }
 
 
+def test_an_empty_answer_is_an_answer_and_an_unknown_term_is_named() -> None:
+    asked = confab("query", "beverage-serving", "SELECT ?o WHERE { ?o k:locaton ?l }")
+    assert (asked.returncode, asked.stdout) == (0, "o\n")
+    assert "no term k:locaton (did you mean 'location'?)" in asked.stderr
+
+
 def test_plan_needs_neither_rdflib_nor_physics_nor_reasoners() -> None:
     script = (
         "import sys; from confab.scene import load; load('beverage-serving').plan(); "

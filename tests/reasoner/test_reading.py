@@ -86,6 +86,19 @@ def test_a_situated_object_needs_exactly_one_value(tmp_path: Path, stated: str, 
         read(load(path))
 
 
+def test_a_missing_value_of_an_individual_of_two_classes_is_explained_by_the_classes(tmp_path: Path) -> None:
+    path = tmp_path / "mine.ttl"
+    path.write_text(
+        SCENE.format("k:location :shelf .").replace(
+            ":floor a owl:NamedIndividual,", ":floor a k:Cup, owl:NamedIndividual,"
+        )
+    )
+    with pytest.raises(
+        KnowledgeError, match=r"floor is a .*, which has .*, and a Location: drop one of the two classes"
+    ):
+        read(load(path))
+
+
 def test_a_negated_goal_of_an_impossible_fact_adds_no_goal(tmp_path: Path) -> None:
     """A towel for which CLEAN doesn't exist isn't clean, with or without that goal."""
     scene = (SCENES / "drawers-small.ttl").read_text()
