@@ -637,7 +637,7 @@ def _with_both_hands(
     caution: Caution | None,
 ) -> Episode:
     """Execute a plan with all hands at once until it ends or fails; then reach the remaining goals in a closed loop."""
-    from confab.planner.acting.episode import ExecutedPrimitive, Failure
+    from confab.planner.acting.episode import ExecutedPrimitive, Failure, changes
     from confab.planner.hierarchical.planner import plan as hierarchical_plan
     from confab.sim.together import perform_together
 
@@ -669,6 +669,10 @@ def _with_both_hands(
         initial=problem.initial,
         events=(*before, *rest.events),
         failures=(*failures, *rest.failures),
+        course=(
+            *changes(problem.initial, rest.initial, max((event.end for event in before), default=0.0)),
+            *rest.course,
+        ),
     )
 
 

@@ -100,6 +100,12 @@ class Seen:
     value: str | None
 
 
+def changes(before: State, after: State, seconds: float) -> list[Seen]:
+    """Return the changes from a situation to another situation that was observed at a time."""
+    changed = (s for s in sorted(before.keys() | after.keys()) if before.get(s) != after.get(s))
+    return [Seen(seconds, symbol, after.get(symbol)) for symbol in changed]
+
+
 def situation(initial: State, course: Iterable[Seen], seconds: float = math.inf) -> dict[Symbol, str]:
     """Return the situation at a time: the initial situation with the changes that were observed until this time."""
     state = dict(initial)

@@ -13,33 +13,49 @@ from confab.planner.acting.episode import Episode, InterventionKind, situation
 from confab.planner.acting.symbolic_world import met, with_individual
 from confab.planner.plan import Plan, Step
 from confab.planner.validation import carried_out, open_goals, successor
-from confab.reasoner.symbols import FALSE, Problem, State
+from confab.reasoner.symbols import FALSE, Problem, State, Symbol
 
 
 def as_planned(problem: Problem, episode: Episode) -> Iterator[tuple[Problem, Plan]]:
     """Yield the parts of an episode that were executed as planned, each with its problem.
 
-    A part consists of consecutive first-level steps. The plan checker accepts each step in the situation that was observed before
-    the step, and no primitive of the step had an unexpected effect. The initial state of the problem is the situation that was
-    observed before the part, and the goals of the problem are the goals of the episode that held after the part.
+    If the executed steps are a valid plan from the first to the last observed situation, they are the only part, even if they
+    overlapped in time. Otherwise, a part consists of consecutive first-level steps. The plan checker accepts each step in the
+    situation that was observed before the step, and no primitive of the step had an unexpected effect. The initial state of the
+    problem is the situation that was observed before the part, and the goals of the problem are the goals of the episode that
+    held after the part.
     """
     problem = with_newcomers(problem, episode)
-    part, start, expected = list[Step](), problem, dict(episode.initial)
+    start = replace(problem, initial=episode.initial, goal={})
+    if not any(event.surprises for event in episode.events) and not carried_out(start, episode.done):
+        expected = after(problem, episode.done, episode.initial)
+        if episode.done.steps and equal(expected, episode.observed):
+            yield with_reached_goals(start, expected, episode.goal), episode.done
+            return
+    part, expected, ended = list[Step](), dict(episode.initial), 0.0
     for step in episode.done.steps:
         done = {(low.path, low.behavior, low.arguments) for low in Plan((step,)).primitives}
         events = [e for e in episode.events if (e.step.path, e.step.behavior, e.step.arguments) in done]
         before = situation(episode.initial, episode.course, events[0].begin)
         here = replace(problem, initial=before, goal={})
-        whole = not any(event.surprises for event in events) and not carried_out(here, Plan((step,)))
+        alone = events[0].begin >= ended  # otherwise, nothing was observed between the earlier steps and this step
+        whole = alone and not any(event.surprises for event in events) and not carried_out(here, Plan((step,)))
+        ended = max(ended, events[-1].end)
         if part and not (whole and equal(before, expected)):
             yield with_reached_goals(start, expected, episode.goal), Plan(tuple(part))
             part = []
         if whole:
-            start, part, expected = start if part else here, [*part, step], before
-            for low in Plan((step,)).primitives:
-                expected = successor(problem, problem.domain.behaviors[low.behavior], low.arguments, expected) or {}
+            start, part, expected = start if part else here, [*part, step], after(problem, Plan((step,)), before)
     if part:
         yield with_reached_goals(start, expected, episode.goal), Plan(tuple(part))
+
+
+def after(problem: Problem, plan: Plan, state: State) -> dict[Symbol, str]:
+    """Return the state after a valid plan."""
+    now = dict(state)
+    for step in plan.primitives:
+        now = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, now) or {}
+    return now
 
 
 def with_newcomers(problem: Problem, episode: Episode) -> Problem:

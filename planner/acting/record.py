@@ -13,6 +13,7 @@ from confab.planner.acting.episode import (
     Intervention,
     Replan,
     Seen,
+    changes,
 )
 from confab.planner.acting.step_trees import tree_of
 from confab.planner.plan import Plan, Reason, Step
@@ -45,8 +46,7 @@ class Record:
 
     def changes(self, before: State, after: State, seconds: float) -> None:
         """Record the symbols whose values differ between two situations."""
-        changed = (s for s in sorted(before.keys() | after.keys()) if before.get(s) != after.get(s))
-        self.course += [Seen(seconds, symbol, after.get(symbol)) for symbol in changed]
+        self.course += changes(before, after, seconds)
 
     def reason(self, reason: Reason) -> None:
         """Record a reason, unless it is recorded already."""

@@ -89,6 +89,9 @@ def test_an_episode_without_failure_teaches_like_its_plan(scene: confab.Scene) -
     one.live(scene.problem, execution.episode)
     other.learn(scene, execution.episode.done)
     assert one.experience.totals() == other.experience.totals() != {}
+    overlapping, at_once = confab.Memory.of(scene), [replace(event, begin=0.0) for event in execution.episode.events]
+    overlapping.live(scene.problem, replace(execution.episode, events=tuple(at_once)))
+    assert overlapping.experience.said == one.experience.said
 
 
 def test_teaching_gives_rules_and_methods_of_every_level(scene: confab.Scene) -> None:
