@@ -7,7 +7,7 @@ sequence is simulated once on symbols, and the simulation records the facts that
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from fractions import Fraction
 from typing import TypeAlias
@@ -156,7 +156,10 @@ class _Course:
         return self.pieces[name]
 
     def begin(self, number: int) -> None:
-        """Begin a step: test its conditions, make the effects of its begin, and store the effects of its end."""
+        """Begin a step: test its conditions, make the effects of its begin, and store the effects of its end.
+
+        What the conditions of an effect read is read at the begin only, since the begin determines the effects.
+        """
         step, pieces = self.steps[number], self.piece(number)
         terms = self.terms[number] = terms_at(self.rules, pieces, step.arguments, self.facts)
         seconds = duration_of(self.problem, pieces.whole, terms, self.facts)
@@ -165,8 +168,11 @@ class _Course:
                 f"{step} has no duration in its state: the calculation gives no number of 0 or more"
             )
         self.seconds[number] = seconds
-        self.made[number]["begin"] = self.done(step, pieces.begin, terms, True)
-        self.made[number]["middle"] = self.done(step, pieces.middle, terms, False)
+        begin = self.done(step, pieces.begin, terms, True)
+        middle = self.done(step, pieces.middle, terms, False)
+        asked = self.done(step, pieces.held, terms, False).reads
+        self.made[number]["begin"] = replace(begin, reads=begin.reads | middle.reads - asked)
+        self.made[number]["middle"] = replace(middle, reads=asked)
 
     def end(self, number: int) -> None:
         """End a step: make the stored effects, test the conditions of its end, and make the effects of its end."""

@@ -41,7 +41,7 @@ class Pieces:
     """The pieces of a behaviour.
 
     The parameters of each piece are the parameters of the behaviour, followed by `fixed`, the variables that the preconditions
-    determine.
+    determine. `held` has the conditions of the middle without its effects.
     """
 
     whole: Behavior
@@ -50,6 +50,7 @@ class Pieces:
     begin: Behavior
     middle: Behavior
     end: Behavior
+    held: Behavior
 
 
 def pieces_of(problem: Problem, behavior: Behavior) -> Pieces:
@@ -74,7 +75,8 @@ def pieces_of(problem: Problem, behavior: Behavior) -> Pieces:
     begin, middle, end = (
         piece(span.value, timing.asked(span), timing.made(span)) for span in (Span.START, Span.THROUGHOUT, Span.END)
     )
-    return Pieces(behavior, fixed, timing, begin, middle, end)
+    held = piece("held", timing.asked(Span.THROUGHOUT), ())
+    return Pieces(behavior, fixed, timing, begin, middle, end, held)
 
 
 def _fixed(behavior: Behavior) -> tuple[Parameter, ...]:

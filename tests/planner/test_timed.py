@@ -267,6 +267,24 @@ def test_a_count_follows_the_facts_in_time_too(tmp_path: Path) -> None:
     ]
 
 
+OVEN = """
+:BAKED a owl:Class, owl:NamedIndividual, c:SituationType . :Book c:hasSituationType :BAKED .
+:BAKE a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 3 ; c:actor :BAKE.shelf ;
+  c:duration "PT10S"^^xsd:dayTimeDuration ; c:update '''
+  INSERT {} WHERE { ?shelf a :Shelf } ; INSERT { :Book :BAKED true } WHERE { :Book :at ?shelf } ''' .
+:BAKE.shelf a owl:NamedIndividual .
+"""
+"""A shelf is an oven: it bakes every book that is on it when the behaviour begins."""
+
+
+def test_an_effect_on_all_members_of_a_class_leaves_the_members_without_the_effect_free(tmp_path: Path) -> None:
+    (tmp_path / "shelves.ttl").write_text(SHELVES + OVEN)
+    goals = ["b3 BAKED true", "b4 BAKED true", "b1 AT s2", "b2 AT s2"]
+    result = confab.load(tmp_path / "shelves.ttl").plan(goals, minimise="makespan")
+    assert result.timed is not None
+    assert [result.timed.serial, result.timed.makespan] == [Fraction(20), Fraction(10)]
+
+
 def test_the_bound_of_any_plan_is_not_above_the_least_makespan() -> None:
     bounds, least = [], []
     for seed in range(13_000, 13_200):
