@@ -10,6 +10,7 @@ import pyoxigraph as ox
 
 from confab.reasoner.condition_nodes import Node
 from confab.reasoner.graph.knowledge import SCENE, KnowledgeGraph, text
+from confab.reasoner.limits import check
 from confab.reasoner.reading.frame import Frame
 from confab.reasoner.reading.rows import FIRST_INDEX_OF_NONE, Member, Schema, Triple, index_of, link, stated
 from confab.reasoner.reading.swrl import SWRL
@@ -20,6 +21,8 @@ PLACES = (*(CORE + name for name in ARGUMENTS), CORE + "value")
 NO_IRI = re.compile(r'[\x00-\x20<>"{}|^`\\]')
 INDEX = CORE + "index"
 FACT = CORE + "SituatedObjectInstance"
+RECOGNISING = "recognising the relevant part of the scene"
+"""The work in progress, in the message of an error at the time limit."""
 
 
 class Individuals:
@@ -67,7 +70,10 @@ class Individuals:
             parts.append(f"{{ ?s a owl:NamedIndividual ; a/rdfs:subClassOf* <{kind}> ; ?p ?o }}")
         rows = []
         links, nodes, numbers = self.links, self.schema.nodes, self.schema.numbers
-        for s, p, o in self.graph.solutions("SELECT ?s ?p ?o WHERE {\n  " + "\n  UNION ".join(parts) + " }", SCENE):
+        query = "SELECT ?s ?p ?o WHERE {\n  " + "\n  UNION ".join(parts) + " }"
+        for count, (s, p, o) in enumerate(self.graph.solutions(query, SCENE)):
+            if not count % 4096:
+                check(RECOGNISING)
             subject, said = text(s), text(p)
             names = isinstance(o, ox.NamedNode)
             if said in numbers:

@@ -125,10 +125,13 @@ def reading_of(
         domain = compiled(known.domain, known.classes)
     except DomainError as error:
         raise KnowledgeError(str(error)) from None
+    check("reading the scene")
     relations, stated = facts_of(facts, {**tuples, **schema.facts}, known.properties, domain, names, schema.numbers)
     initial = initial_state(domain, known.classes, stated, names)
+    check("reading the scene")
     initial = with_totals(domain, known.classes, relations, initial)
     check_values(initial | exceptions(domain, known.classes, relations, initial), domain, names)
+    check("reading the scene")
     levels = {names.short(iri): level for iri, level in schema.from_levels.items() if iri not in schema.nodes}
     problem = Problem(scene, domain, known.classes, relations, initial, {}, known.parents, levels)
     wanted = with_task(problem, known.parts, schema.of_kind("Task"))

@@ -30,7 +30,15 @@ from confab.reasoner.limits import check
 from confab.reasoner.names import local_name
 from confab.reasoner.reading.frame import Frame, frame
 from confab.reasoner.reading.goals import BOUNDS, with_goals
-from confab.reasoner.reading.individuals import FACT, PLACES, Individuals, constants_of, goal_conditions, values_of
+from confab.reasoner.reading.individuals import (
+    FACT,
+    PLACES,
+    RECOGNISING,
+    Individuals,
+    constants_of,
+    goal_conditions,
+    values_of,
+)
 from confab.reasoner.reading.problem import Reading, read, reading_of
 from confab.reasoner.reading.remembering import concerns_the_past
 from confab.reasoner.reading.rows import Member, Schema, Triple, derived_goals
@@ -111,7 +119,7 @@ def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
             f"a condition, an effect or a goal leads to something without a name (_:{nameless[0]}), where an individual belongs"
         )
     fresh = search.visit(seeds | constants)
-    check("recognising the relevant part of the scene")
+    check(RECOGNISING)
     lifted = frame(schema, [member for member in search.members() if member[0] in constants])
     bounds = routes(lifted, [goal.split()[1] for goal in goals if " " in goal.strip()])
     search.close(fresh, constants, bounds)
@@ -404,7 +412,9 @@ class _Search(Individuals):
         facts = set[str]()
         backward = bounds.backward.keys() - {*PLACES}
         nodes, forward = self.schema.nodes, bounds.forward
-        for s, p, o in triples:
+        for count, (s, p, o) in enumerate(triples):
+            if not count % 4096:
+                check(RECOGNISING)
             if s in nodes:
                 continue
             if p in forward:
@@ -445,7 +455,9 @@ def _namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member])
     """
     terms = {iri for individual, kind, _ in members for iri in (individual, kind)} - schema.nodes.keys()
     endings = {local_name(iri) for iri in terms}
+    check(RECOGNISING)
     candidates = {space + ending for space in _spaces(graph, schema, terms) for ending in endings} - terms
+    check(RECOGNISING)
     if not candidates:
         return set()
     rows = graph.select(
