@@ -55,6 +55,9 @@ ABOVE = 0.01
 NEARLY = 0.97
 """A camera sees a handle if its ray first hits the mechanism, and not before this share of the distance to the handle."""
 
+FRONT = 0.12
+"""Minimum distance in metres by which a thing in front of a place hides the name of the place."""
+
 STACKED = 3
 """Number of rows in which names are stacked if they would overlap."""
 
@@ -213,7 +216,7 @@ class Film:
             rows = [y - 24 - 18 * row for row in range(STACKED)] if thing else [y + 8]
             boxes = ((x - half, row, x + half, row + 16) for row in rows)
             box = next((box for box in boxes if not _meets(box, taken)), None)
-            if box is None:
+            if box is None or (not thing and _shines_through(world, self.camera, box, points[0][0])):
                 continue
             taken.append(box)
             draw.rounded_rectangle(box, 4, fill=(40, 50, 70, 190) if thing else (250, 251, 253, 110))
@@ -274,6 +277,16 @@ def _visible(world: Engine, camera: Camera, point: Array, name: str) -> bool:
     met = world.name_of(hit[0], hit[1])
     there = name in world.embodiment.places and met in world.bodies
     return met == name or (there and float(np.linalg.norm(world.truth(met)[1] - world.place(name))) < NEAR_PLACE)
+
+
+def _shines_through(world: Engine, camera: Camera, box: tuple[float, float, float, float], point: Array) -> bool:
+    """Return whether the middle of a name would be on something that is well in front of the named point."""
+    row, column = round((box[1] + box[3]) / 2), round((box[0] + box[2]) / 2)
+    if not (0 <= row < camera.height and 0 <= column < camera.width):
+        return False
+    away = float(camera.axes[2] @ (point - np.array(camera.eye))) - FRONT
+    end = np.array(camera.eye) + camera.rays[row, column] * away
+    return bool(pybullet.rayTest(camera.eye, end.tolist(), physicsClientId=world.client)[0][0] >= 0)
 
 
 def _covered(world: Engine, name: str) -> bool:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import confab
+from confab.sim.faults import stranger
 from confab.sim.film import BAR, Film, _points, _visible
 from confab.sim.picture import view_of
 from confab.sim.world import PhysicsWorld
@@ -31,6 +32,23 @@ def test_a_film_shows_the_names_of_visible_objects_only(world: PhysicsWorld) -> 
     world.links["door"].set("door", True)
     film.names = {"jar": "a jar with a name as long as half the picture"}  # the jar is visible
     assert not (film._named(BLANK, world) == named).all()
+
+
+def test_the_name_of_a_place_is_not_written_on_a_thing_in_front_of_the_place(world: PhysicsWorld) -> None:
+    film = Film("unwritten.mp4", [])
+    film.camera = camera = view_of(SCENE.embodiment, film.width, film.height, BAR)
+    point, name = _points(world, "pot_top")[0]
+    away = np.array(camera.eye) - point
+    middle = point + 0.3 * away / np.linalg.norm(away)
+    pictures = []
+    for size, written in ((0.0, True), (0.06, False)):
+        if size:
+            stranger((middle[0], middle[1], middle[2] - size - 0.008), (0.01, size, size))(world)
+        film.names = {}
+        pictures.append(film._named(BLANK, world))
+        film.names = {name: "spot"}
+        assert (film._named(BLANK, world) != pictures[-1]).any() == written
+        assert _visible(world, camera, point, name)
 
 
 def test_the_camera_turns_to_a_side_on_which_the_handle_is_visible(world: PhysicsWorld) -> None:
