@@ -13,10 +13,11 @@ satisfy it.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from functools import cached_property
 from math import prod
-from typing import TypeAlias
+from typing import TypeAlias, TypeGuard
 
 from confab.planner.amount_transitions import approaches_goal
 from confab.planner.derived_facts import CompiledRules
@@ -37,11 +38,15 @@ from confab.reasoner.symbols import (
     RelationCondition,
     SituationType,
     ValueCondition,
+    ValueEffect,
     Witness,
     allowed,
 )
 
 Arguments: TypeAlias = "tuple[str, ...]"
+AnyEffect: TypeAlias = "ValueEffect | AmountEffect"
+Determined: TypeAlias = "dict[str, tuple[str, tuple[str, ...]]]"
+"""The symbol that determines each variable, as a situation type with argument terms."""
 Achieve: TypeAlias = "Callable[..., Iterator[tuple[Arguments, tuple[int, ...], dict[str, str | None]]]]"
 """Function that yields the arguments of a behaviour, the positions of unmet conditions, and a binding.
 
@@ -66,6 +71,28 @@ class Achiever:
     determining: Sequence[Condition] = ()
     rule: bool = False
     deep: bool = False
+
+
+class Block:
+    """Lines of Python code; each opened line indents the lines that follow."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self._depth = 0
+
+    def add(self, line: str) -> None:
+        """Add a line."""
+        self.lines.append("    " * self._depth + line)
+
+    def open(self, line: str) -> None:
+        """Add a line, and indent the lines that follow."""
+        self.add(line)
+        self._depth += 1
+
+
+def determines(condition: Condition, bound: AbstractSet[str]) -> TypeGuard[ValueCondition]:
+    """Return whether a condition gives an unbound variable the value of a symbol."""
+    return isinstance(condition, ValueCondition) and condition.value.startswith("?") and condition.value not in bound
 
 
 @dataclass
@@ -164,77 +191,82 @@ class Program:
                 yield from self._achieve(behavior, number)
 
     def _achieve(self, behavior: Behavior, number: int) -> Iterator[str]:
+        """Yield the lines of the function `achieve` of an effect, and add the effect to the achievers."""
         effect = behavior.every_effect[number]
-        kinds = behavior.kinds
-        given_to = effect.arguments if isinstance(effect, AmountEffect) else (*effect.arguments, effect.value)
         name = f"{identifier('achieve', behavior.name)}_{number}"
         inputs = [f"i{i}" for i in range(len(effect.arguments) + 1)]
-        hard: set[str] = set()
+        waiting = [*effect.when, *behavior.preconditions, *allowed(behavior, self.domain.situations)]
+        block = Block()
+        bound = self._enumerated(behavior, effect, inputs, waiting, block)
+        block.add("unmet = ()")
+        soft, determined = self._tested(behavior, waiting, bound, block)
+        if isinstance(effect, AmountEffect):
+            block.open(f"if {approaches_goal(effect, inputs[-1], self.problem.relations, self.writer.constant)}:")
+        names = ", ".join(f"{term!r}: {written(term)}" for term in sorted(bound))
+        arguments = tuple_written(written(p.name) for p in behavior.parameters)
+        block.add(f"yield {arguments}, unmet, {{{names}}} if unmet else None")
+        yield f"def {name}({', '.join(inputs)}):"
+        yield from ("    " + line for line in block.lines)
+        yield f"achieve[{behavior.name!r}, {number}] = {name}"
+        achiever = Achiever(behavior.name, number, tuple(soft), determined, behavior.kinds)
+        self.achievers.setdefault((behavior.level, effect.situation), []).append(achiever)
+
+    def _enumerated(
+        self, behavior: Behavior, effect: AnyEffect, inputs: Sequence[str], waiting: list[Condition], block: Block
+    ) -> set[str]:
+        """Write loops over the candidates of unbound parameters, with tests on bound terms; return the bound terms.
+
+        The conditions that no behaviour of the level can change are tested, and removed from `waiting`.
+        """
+        bound: set[str] = set()
         tests: list[str] = []
-        lines: list[str] = []
-        for term, given in zip(given_to, inputs, strict=False):  # the wanted value of an amount is the last input
-            if term.startswith("?") and term not in hard:
-                hard.add(term)
-                lines.append(f"{written(term)} = {given}")
-                tests.append(self.writer.member(term, kinds[term]))
+        outputs = effect.arguments if isinstance(effect, AmountEffect) else (*effect.arguments, effect.value)
+        for term, given in zip(outputs, inputs, strict=False):  # the wanted value of an amount is the last input
+            if term.startswith("?") and term not in bound:
+                bound.add(term)
+                block.add(f"{written(term)} = {given}")
+                tests.append(self.writer.member(term, behavior.kinds[term]))
             else:
                 tests.append(f"{given} == {written(term)}")
-        waiting = [*effect.when, *behavior.preconditions, *allowed(behavior, self.domain.situations)]
-        free = [p.name for p in behavior.parameters if p.name not in hard]
-        depth = 0
-
-        def emit(text: str) -> None:
-            lines.append("    " * depth + text)
-
-        # Hard: tests on bound terms, and enumeration of unbound terms.
+        free = [p.name for p in behavior.parameters if p.name not in bound]
         while True:
-            ready = [c for c in waiting if self._static(c, kinds, behavior) and not mentions(c) - hard]
-            for condition in ready:
+            for condition in [
+                c for c in waiting if self._static(c, behavior.kinds, behavior) and not mentions(c) - bound
+            ]:
                 waiting.remove(condition)
-                tests.append(self.writer.expression(condition, hard, kinds, behavior.name))
-            generator = self._generator(waiting, hard, kinds, behavior, free)
+                tests.append(self.writer.expression(condition, bound, behavior.kinds, behavior.name))
+            generator = self._generator(waiting, bound, behavior.kinds, behavior, free)
             if tests:
-                emit(f"if {' and '.join(tests)}:")
-                depth, tests = depth + 1, []
+                block.open(f"if {' and '.join(tests)}:")
             if generator is None:
-                break
-            term, text = generator
-            emit(f"for {written(term)} in {text}:")
-            depth += 1
-            hard.add(term)
-            free = [p for p in free if p != term]
-            tests.append(self.writer.member(term, kinds[term]))
-        # Soft: terms that the state determines, and tests on these terms.
-        emit("unmet = ()")
-        bound = set(hard)
+                return bound
+            term, candidates = generator
+            block.open(f"for {written(term)} in {candidates}:")
+            bound.add(term)
+            free = [one for one in free if one != term]
+            tests = [self.writer.member(term, behavior.kinds[term])]
+
+    def _tested(
+        self, behavior: Behavior, waiting: Sequence[Condition], bound: set[str], block: Block
+    ) -> tuple[list[Condition], Determined]:
+        """Write tests that add the unmet conditions to `unmet`; bind the variables that the state determines.
+
+        Return the conditions in the order of the tests, and the symbol that determines each variable.
+        """
         soft: list[Condition] = []
-        determined: dict[str, tuple[str, tuple[str, ...]]] = {}
+        determined: Determined = {}
         for condition in in_binding_order(waiting, bound, behavior.name):
-            if (
-                isinstance(condition, ValueCondition)
-                and condition.value.startswith("?")
-                and condition.value not in bound
-            ):
+            if determines(condition, bound):
                 # The variable is bound even if the value isn't a member of its class, because later tests use the variable.
                 bound.add(condition.value)
                 determined[condition.value] = condition.situation, condition.arguments
-                emit(f"{written(condition.value)} = {self.writer.look(condition)}")
-                test = self.writer.member(condition.value, kinds[condition.value])
+                block.add(f"{written(condition.value)} = {self.writer.look(condition)}")
+                test = self.writer.member(condition.value, behavior.kinds[condition.value])
             else:
-                test = self.writer.expression(condition, bound, kinds, behavior.name)
-            emit(f"if not ({test}): unmet += ({len(soft)},)")
+                test = self.writer.expression(condition, bound, behavior.kinds, behavior.name)
+            block.add(f"if not ({test}): unmet += ({len(soft)},)")
             soft.append(condition)
-        if isinstance(effect, AmountEffect):
-            emit(f"if {approaches_goal(effect, inputs[-1], self.problem.relations, self.writer.constant)}:")
-            depth += 1
-        names = ", ".join(f"{term!r}: {written(term)}" for term in sorted(bound))
-        arguments = tuple_written(written(p.name) for p in behavior.parameters)
-        emit(f"yield {arguments}, unmet, {{{names}}} if unmet else None")
-        yield f"def {name}({', '.join(inputs)}):"
-        yield from ("    " + line for line in lines)
-        yield f"achieve[{behavior.name!r}, {number}] = {name}"
-        achiever = Achiever(behavior.name, number, tuple(soft), determined, kinds)
-        self.achievers.setdefault((behavior.level, effect.situation), []).append(achiever)
+        return soft, determined
 
     @staticmethod
     def _rule(rule: Behavior) -> tuple[tuple[str, ...], Achiever]:
@@ -242,18 +274,13 @@ class Program:
 
         The conditions of the achiever are in binding order.
         """
-        soft = list[Condition]()
         parameters = tuple(p.name for p in rule.parameters)
-        bound = set(parameters)
-        determined: dict[str, tuple[str, tuple[str, ...]]] = {}
+        bound, soft = set(parameters), list[Condition]()
+        determined: Determined = {}
         determining: list[Condition] = []
         for condition in in_binding_order(rule.preconditions, bound, rule.name):
             soft.append(condition)
-            if (
-                isinstance(condition, ValueCondition)
-                and condition.value.startswith("?")
-                and condition.value not in bound
-            ):
+            if determines(condition, bound):
                 bound.add(condition.value)
                 determined[condition.value] = condition.situation, condition.arguments
                 determining.append(condition)
