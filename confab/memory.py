@@ -372,11 +372,11 @@ class Memory(metaclass=RightNames):
             lines += ["", f"{record}:", *(f"  – {rule}" for rule in rules)]
         others = self.also()[:most]
         lines += [*(["", "Besides:"] if others else []), *(f"  – {other}" for other in others)]
-        lasting = [
+        durations = [
             f"  – {behavior} by {actor}: {mean} s ± {spread} s, {counted(int(str(count)), 'execution')}"
             for behavior, actor, mean, spread, count in self.durations(most)
         ]
-        return "\n".join([*lines, *(["", "Measured durations:"] if lasting else []), *lasting])
+        return "\n".join([*lines, *(["", "Measured durations:"] if durations else []), *durations])
 
     def also(self) -> list[str]:
         """Return, as sentences with counts, the learned orders of goals and the learned methods."""

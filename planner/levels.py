@@ -89,8 +89,8 @@ class _Watch:
             symbol = Symbol(situation, arguments)
             for level in self.left:
                 old = self.views[level].value(situation, arguments)
-                lasting = situation not in self.problem.domain.remembers and old != value
-                if self.problem.sees(level, symbol, value) and lasting:
+                stays = situation not in self.problem.domain.remembers and old != value
+                if self.problem.sees(level, symbol, value) and stays:
                     self.left[level].extend(self.judged(level, step, Fact(symbol, value)))
                     self.history[level].append(((situation, arguments), old))
                     self.views[level].put(situation, arguments, value)

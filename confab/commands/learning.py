@@ -161,8 +161,8 @@ def show(memory: str, most: int, as_json: bool) -> None:
         loaded = Memory.load(memory, load_scene(name))
     if as_json:
         rules, also = loaded.advice(most).records(), loaded.also()[:most]
-        lasting = loaded.durations(most).records()
-        show_result({"memory": memory, "summary": repr(loaded), "rules": rules, "also": also, "durations": lasting})
+        durations = loaded.durations(most).records()
+        show_result({"memory": memory, "summary": repr(loaded), "rules": rules, "also": also, "durations": durations})
     else:
         show_result(loaded.page(most))
 

@@ -18,12 +18,12 @@ from difflib import SequenceMatcher
 
 from confab.planner.certified import certified
 from confab.planner.hierarchical.agenda import Agenda, order
-from confab.planner.hierarchical.call import Call, Compiled, compiled, settle
+from confab.planner.hierarchical.call import Call, Compiled, bring_to_rest, compiled
 from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.hierarchical.refinement import RefinedStep
 from confab.planner.hierarchical.search_budget import ONE_STEP
 from confab.planner.hierarchical.unsolvability import impossible
-from confab.planner.hierarchical.windows import refined
+from confab.planner.hierarchical.windows import as_refined
 from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, UnsolvableError, renumbered
 from confab.planner.plan_costs import cost_of, costs_of_steps
 from confab.planner.transitions import Cell, arguments_of, key_of
@@ -134,14 +134,14 @@ def repair(
             _finish(call, pending, wanted)
         elif not call.at_rest():
             del pending[:1]
-        settle(call)
+        bring_to_rest(call)
         finished = len(call.steps)
         _restore(call, pending)
         restored = len(call.steps)
         whole = _replay(call, pending, wanted)
         # If no step is dropped, every kept step still has a purpose.
         kept = (*range(finished), *range(restored, len(call.steps))) if whole else ()
-        settle(call)
+        bring_to_rest(call)
         now = replace(problem, initial={**problem.initial, **call.table.state()})
         solved = not impossible(now) and agenda.achieve_all()
     except (LimitError, UnsolvableError):
@@ -177,7 +177,7 @@ def replan(
     call = Call(problem, using, end, limits.expansions)
     if not call.at_rest():
         try:
-            settle(call)
+            bring_to_rest(call)
         except LimitError as limit:
             return None, Outcome(Status.GAVE_UP, None, Reason(f"stopped at the limit: {limit}"))
         first, problem = call.tree().steps, replace(problem, initial=call.table.state())
@@ -266,7 +266,7 @@ def _restore(call: Call, pending: Sequence[Step]) -> None:
     before = order(call) if orphans else {}
     for cell in orphans:
         if not any(other in orphans for other in before.get(cell, ())):
-            call.achieve(call.program.levels[0], cell, ONE_STEP)
+            call.achieve_goal(call.program.levels[0], cell, ONE_STEP)
 
 
 def _replay(call: Call, pending: list[Step], wanted: State) -> bool:
@@ -316,7 +316,7 @@ def _redo(call: Call, step: Step, begun: bool = False) -> RefinedStep | None:
     its effects.
     """
     mark = len(call.table.trail)
-    one = refined(call, (step,))[0]._replace(steps=())
+    one = as_refined(call, (step,))[0]._replace(steps=())
     applicable, stated = call.refiner.stated(one)
     if not step.steps or (applicable is None and not begun):
         return applicable if not step.steps else None
@@ -339,7 +339,7 @@ def _achieve_instead(call: Call, effects: Mapping[Cell, str]) -> None:
     """For each symbol that a step would change, achieve the symbol's open goal instead, if one step can achieve it."""
     for cell in effects:
         if cell in call.goal and not call.met(cell):
-            call.achieve(call.program.levels[0], cell, ONE_STEP)
+            call.achieve_goal(call.program.levels[0], cell, ONE_STEP)
 
 
 def _useless(call: Call, effects: Mapping[Cell, str], wanted: State) -> bool:

@@ -16,7 +16,7 @@ from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from confab.planner.hierarchical.call import Call, settle
+from confab.planner.hierarchical.call import Call, bring_to_rest
 from confab.planner.hierarchical.operators import Achiever
 from confab.planner.hierarchical.relevance import waits_for
 from confab.planner.hierarchical.search_budget import (
@@ -104,7 +104,7 @@ class Agenda:
         call = self.call
         self._before, self._asleep, self._waiting = order(call), {}, {}
         call.kept = {cell: value for cell, value in call.goal.items() if call.met(cell)}
-        call.refiner.hasty = self.settles()
+        call.refiner.hasty = self.may_bring_to_rest()
         self._open = deque(cell for cell in call.goal if cell not in call.kept)
 
     def at_once(self, cell: Cell) -> bool:
@@ -115,9 +115,9 @@ class Agenda:
         call, first = self.call, self.call.program.levels[0]
         unmet = [other for other in self._before.get(cell, ()) if other not in call.kept]
         promised = call.advice.rank(cell) if call.advice is not None and not unmet else 0
-        if not unmet and promised == 1 and call.achieve(first, cell, BY_RULES):
+        if not unmet and promised == 1 and call.achieve_goal(first, cell, BY_RULES):
             return True
-        if not unmet and promised < 2 and call.achieve(first, cell, ONE_STEP):
+        if not unmet and promised < 2 and call.achieve_goal(first, cell, ONE_STEP):
             return True
         self._asleep[cell] = None
         for other in unmet or waits_for(call.space, call.program.levels[0], cell, call.goal[cell]):
@@ -163,7 +163,7 @@ class Agenda:
             return True
         for level in call.program.levels:
             *small, large = scopes(call.program.size(level))
-            if self.singly(level, FEW_STEPS) or self.singly(level, *small) or self.settle():
+            if self.singly(level, FEW_STEPS) or self.singly(level, *small) or self.bring_to_rest():
                 return True
             if self.quickly:
                 continue
@@ -192,7 +192,7 @@ class Agenda:
                 continue
             if budgets == (BY_RULES,) or (level, *budgets) in call.failed.get(cell, ()):
                 continue
-            if call.achieve(level, cell, *budgets):
+            if call.achieve_goal(level, cell, *budgets):
                 return True
             call.failed.setdefault(cell, set()).add((level, *budgets))
             if not budgets[0].steps:
@@ -211,27 +211,27 @@ class Agenda:
         if call.advice is None or not call.advice.ready() or attempt in call.failed.get(cell, ()):
             return False
         call.failed.setdefault(cell, set()).add(attempt)
-        return call.achieve(attempt[0], cell, BY_RULES)
+        return call.achieve_goal(attempt[0], cell, BY_RULES)
 
-    def settles(self) -> bool:
+    def may_bring_to_rest(self) -> bool:
         """Return whether some symbol isn't at rest, and steps of lower levels may still be tried to bring the symbol to rest."""
         call = self.call
         return (
-            not (call.settled or call.at_rest())
+            not (call.brought_to_rest or call.at_rest())
             and len(call.program.levels) > 1
             and self.allowed(call.program.levels[-1])
         )
 
-    def settle(self) -> bool:
+    def bring_to_rest(self) -> bool:
         """Bring all symbols to rest by steps of lower levels; return whether steps were applied.
 
         Steps of the first level may become applicable when all symbols are at rest.
         """
         call = self.call
-        if not self.settles():
+        if not self.may_bring_to_rest():
             return False
-        call.settled, call.refiner.hasty, steps = True, False, len(call.steps)
-        settle(call)
+        call.brought_to_rest, call.refiner.hasty, steps = True, False, len(call.steps)
+        bring_to_rest(call)
         if len(call.steps) > steps:
             call.given_up.append("steps of a lower level bring symbols to rest that aren't at rest in the beginning")
             return True
@@ -277,10 +277,10 @@ class Agenda:
             return False
         self._tried[level] = len(call.steps)
         open_ = {c: v for c, v in call.goal.items() if not call.met(c) and call.space.visible(level, c)}
-        if not open_ or call.reach(level, open_, PART):
+        if not open_ or call.achieve_goals(level, open_, PART):
             return bool(open_)
         self.proofs.certify(WHOLE.work)
-        return call.reach(level, open_, WHOLE)
+        return call.achieve_goals(level, open_, WHOLE)
 
 
 # ------------------------------------------------------------------------------------------------------- order of goals
@@ -317,7 +317,7 @@ def rules_out(call: Call, first: Cell, then: Cell) -> bool:
     try:
         dead = False
         for achiever in call.program.achievers.get((level, then[0]), ()):
-            achieve = call.space.achieve[achiever.behavior, achiever.effect]
+            achieve = call.space.achieving[achiever.behavior, achiever.effect]
             for _, unmet, env in achieve(*arguments_of(then[1]), call.goal[then]):
                 if all(attainable(call, level, achiever.soft[number], achiever, env) for number in unmet):
                     return False
@@ -332,7 +332,7 @@ def attainable(call: Call, level: int, condition: Condition, achiever: Achiever,
     for situation, key, values in call.space.subgoals.of(achiever, condition, env, level):
         for other in call.program.achievers.get((level, situation), ()):
             for value in values:
-                achieve = call.space.achieve[other.behavior, other.effect]
+                achieve = call.space.achieving[other.behavior, other.effect]
                 if next(achieve(*arguments_of(key), value), None) is not None:
                     return True
     return False

@@ -1,6 +1,6 @@
 """One planning call: the workspace, the goals, and the applied steps.
 
-`Call.achieve` searches for steps of a level towards a goal, and immediately refines and applies these steps to the table.
+`Call.achieve_goal` searches for steps of a level towards a goal, and immediately refines and applies these steps to the table.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ class Call:
         """The cost that the last round of shortening saved per second; None before shortening."""
         self.bound: float | None = None
         """A lower bound on the cost of every plan, if the primitives have different costs."""
-        self.settled = False
+        self.brought_to_rest = False
         """Whether the planner has tried to bring to rest the symbols that aren't at rest in the initial state."""
 
     def advise(self, advice: GoalAdvice) -> None:
@@ -100,11 +100,11 @@ class Call:
         for step in steps:
             self.refiner.replay_checked(step)
 
-    def achieve(self, level: int, cell: Cell, *budgets: SearchBudget) -> bool:
+    def achieve_goal(self, level: int, cell: Cell, *budgets: SearchBudget) -> bool:
         """Achieve one goal by refined steps of a level and keep the achieved goals; return whether that succeeded."""
-        return self.reach(level, {cell: self.goal[cell]}, *budgets)
+        return self.achieve_goals(level, {cell: self.goal[cell]}, *budgets)
 
-    def reach(self, level: int, targets: dict[Cell, str], *budgets: SearchBudget) -> bool:
+    def achieve_goals(self, level: int, targets: dict[Cell, str], *budgets: SearchBudget) -> bool:
         """Apply refined steps of a level so that the targets and all achieved goals hold; return whether that succeeded."""
         first = self.program.levels[0]
         self.aim, self.refiner.at = targets, None
@@ -211,7 +211,7 @@ def fresh_call(call: Call, problem: Problem) -> Call:
     return other
 
 
-def settle(call: Call) -> bool:
+def bring_to_rest(call: Call) -> bool:
     """Bring all symbols that the upper levels don't see to rest, the lowest level first; return whether that succeeded.
 
     A held object is put at its goal if a few steps suffice for this, otherwise at any place.

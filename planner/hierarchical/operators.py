@@ -100,7 +100,7 @@ class BoundProgram:
     """The compiled functions of a program, bound to one table."""
 
     forward: dict[str, Forward]
-    achieve: dict[tuple[str, int], Achieve]
+    achieving: dict[tuple[str, int], Achieve]
 
 
 FEW = 8

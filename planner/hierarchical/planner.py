@@ -26,7 +26,7 @@ from confab.planner.hierarchical.agenda import Agenda
 from confab.planner.hierarchical.call import Call, Compiled, compiled
 from confab.planner.hierarchical.scope import BITS
 from confab.planner.hierarchical.shortening import ORDERS, shortened
-from confab.planner.hierarchical.windows import refined, regroupings
+from confab.planner.hierarchical.windows import as_refined, regroupings
 from confab.planner.plan import Limits, Outcome, Reason, Status, UnsolvableError, paused_collection
 from confab.planner.transitions import arguments_of
 from confab.planner.validation import validate
@@ -118,7 +118,7 @@ def _plan(
             if flat.status is Status.UNSOLVABLE or (flat.status is Status.SOLVED and deadline is None):
                 return replace(call.outcome(flat.status, flat.plan, flat.reason), bound=flat.bound)
             if flat.plan is not None:
-                call.steps, call.bound, done = refined(call, flat.plan.steps), flat.bound, True
+                call.steps, call.bound, done = as_refined(call, flat.plan.steps), flat.bound, True
         if done or agenda.achieve_all():
             call.space.most_work = math.inf
             plan = shortened(call, improve, leave_levels, advised) if improve else call.tree()

@@ -68,7 +68,7 @@ def chains(
                     continue
                 asked.add(question)
                 for achiever in space.program.achievers.get((level, situation), ()):
-                    achieve = space.achieve[achiever.behavior, achiever.effect]
+                    achieve = space.achieving[achiever.behavior, achiever.effect]
                     for arguments, unmet, env in achieve(*arguments_of(key), wanted):
                         space.look()
                         if met is not None:
@@ -99,7 +99,7 @@ def waits_for(space: Workspace, level: int, cell: Cell, value: str) -> list[Cell
     if cell[0] in space.program.rules:
         return [subgoal[:2] for subgoal in space.subgoals.defining(*cell, value == TRUE, level)]
     for achiever in space.program.achievers.get((level, cell[0]), ()):
-        for _, unmet, env in space.achieve[achiever.behavior, achiever.effect](*arguments_of(cell[1]), value):
+        for _, unmet, env in space.achieving[achiever.behavior, achiever.effect](*arguments_of(cell[1]), value):
             space.look()
             for number in unmet:
                 for situation, key, _ in space.subgoals.towards(achiever, number, env, level):

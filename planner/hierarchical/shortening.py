@@ -22,7 +22,7 @@ from time import perf_counter
 from confab.planner.hierarchical.agenda import Agenda
 from confab.planner.hierarchical.call import Call, fresh_call
 from confab.planner.hierarchical.detours import without_detours
-from confab.planner.hierarchical.windows import improves, lower_bound, primitives, refined, regroupings, windowed
+from confab.planner.hierarchical.windows import as_refined, improves, lower_bound, primitives, regroupings, windowed
 from confab.planner.plan import Plan
 from confab.planner.plan_costs import compared
 from confab.planner.transitions import Cell, arguments_of, key_of
@@ -64,7 +64,7 @@ def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Cal
     most 2 n rounds. If other steps of the lowest level can make refinements cheaper, repeated shortening has at least
     `LEAST_ROUNDS` rounds. A brief call has one round with little work, or no round if the call has a time limit.
     """
-    least = LEAST_ROUNDS if lasting(call) else 1
+    least = LEAST_ROUNDS if costs_depend(call) else 1
     if prices(call) > 1 and call.bound is None:
         call.bound = lower_bound(call)
     brief, repeated = (call.space.shortening == name for name in ("brief", "repeated"))
@@ -91,12 +91,12 @@ def shorten_once(call: Call, work: int, leave_levels: bool, advised: Callable[[C
     if aside:
         drop_detours(call, levels[-2])
     detours = drop_detours(call, levels[-1])
-    if aside or detours or call.given_up or len(levels) == 1 or lasting(call):
+    if aside or detours or call.given_up or len(levels) == 1 or costs_depend(call):
         for level in levels[1:] or levels:
             windowed(call, level, work)
 
 
-def lasting(call: Call) -> bool:
+def costs_depend(call: Call) -> bool:
     """Return whether the cost of a refinement may depend on earlier steps, or on a choice of primitives with different costs."""
     return call.refiner.drifting or prices(call) > 1
 
@@ -198,5 +198,5 @@ def drop_detours(call: Call, level: int) -> bool:
     if len(new.at_level(call.program.levels[0])) < len(old.at_level(call.program.levels[0])):
         grouped = regroupings(call.problem, Plan(new.at_level(level)), level, call.using)[0]
         if improves(call.problem, grouped, old, level) and not validate(call.problem, grouped):
-            call.steps = refined(call, grouped.steps)
+            call.steps = as_refined(call, grouped.steps)
     return True

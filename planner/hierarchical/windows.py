@@ -49,7 +49,7 @@ def windowed(call: Call, level: int, work: int) -> None:
     problem, old = call.problem, call.tree()
     for plan in regroupings(problem, other.tree(), level, call.using):
         if improves(problem, plan, old, level) and not validate(problem, plan):
-            call.steps = refined(call, plan.steps)
+            call.steps = as_refined(call, plan.steps)
             return
 
 
@@ -110,7 +110,7 @@ def regroupings(problem: Problem, plan: Plan, level: int, using: Compiled) -> tu
     return under_the_levels_above(problem, plan, using), plan
 
 
-def refined(call: Call, steps: Sequence[Step]) -> list[RefinedStep]:
+def as_refined(call: Call, steps: Sequence[Step]) -> list[RefinedStep]:
     """Return the steps of a plan as instances of `RefinedStep`."""
     names = call.program.variables
     return [
@@ -119,8 +119,8 @@ def refined(call: Call, steps: Sequence[Step]) -> list[RefinedStep]:
             step.behavior,
             step.arguments,
             tuple(step.bindings.get(name, "") for name in names[step.behavior]) if step.bindings else (),
-            tuple(refined(call, step.steps)),
-            tuple(refined(call, step.joined)),
+            tuple(as_refined(call, step.steps)),
+            tuple(as_refined(call, step.joined)),
         )
         for step in steps
     ]

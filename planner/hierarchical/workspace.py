@@ -1,7 +1,7 @@
 """The common data of all searches of one call: the table of current values, the bound behaviours, and the budget.
 
 `table` contains the current values of all symbols; changes are made in place and can be undone. `forward` contains a function for
-each behaviour; given the arguments, it returns the changes, or None if the behaviour isn't applicable. `achieve` contains a
+each behaviour; given the arguments, it returns the changes, or None if the behaviour isn't applicable. `achieving` contains a
 function for each effect; given a symbol and a value, it yields the arguments with which the effect achieves the value. `keep` is a
 function of a symbol and its first value; it returns the required final value, or None if any value is allowed. The budget is the
 work of all searches, in units of about a microsecond. The search of a scope costs the number of states times the number of
@@ -74,7 +74,7 @@ class Workspace:
         if self.deadline is None:
             self.deadline = Limits().end()
         bound = self.program.bind(self.table)
-        self.forward, self.achieve = bound.forward, bound.achieve
+        self.forward, self.achieving = bound.forward, bound.achieving
         self.subgoals = Subgoals(self.program, self.table, self.goal)
         self.candidates = self.subgoals.candidates
         self.counts = {level: Counts() for level in self.program.levels}

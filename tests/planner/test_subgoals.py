@@ -50,7 +50,7 @@ def test_cached_subgoals_are_those_of_the_present_state(
                 for achiever in achievers if at == level else ():
                     for (_, key), value in cells:
                         arguments = (key,) if isinstance(key, str) else key
-                        achieve = kept.space.achieve[achiever.behavior, achiever.effect]
+                        achieve = kept.space.achieving[achiever.behavior, achiever.effect]
                         for _, unmet, env in achieve(*arguments, value):
                             for number in unmet:
                                 anew = list(fresh.space.subgoals.of(achiever, achiever.soft[number], env, level))
@@ -91,7 +91,7 @@ def test_tuples_of_many_places_are_searched_by_their_known_arguments(monkeypatch
 
     monkeypatch.setattr(Program, "_picked", counted)
     call = Call(problem, Compiled(Program(problem)), None, 100)
-    found = list(call.space.achieve["TURN", 0]("piece", spots[9]))
+    found = list(call.space.achieving["TURN", 0]("piece", spots[9]))
     assert [arguments for arguments, _, _ in found] == [("piece", "table2", *spots[8:12])]
     assert len(asked) < len(spots)
 
