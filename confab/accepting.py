@@ -34,6 +34,10 @@ symbols to values.
 """
 
 
+MOST_NOISE = 0.05
+"""Maximum standard deviation of the noise of a measurement, in metres."""
+
+
 class Stated(list[str]):
     """An immutable list of facts as texts. An index like ``facts["cup1 LOCATION"]`` selects the value of a symbol."""
 
@@ -173,6 +177,20 @@ def number(name: str, given: object, wanted: str = "a number") -> None:
     """
     if given is not None and (isinstance(given, bool) or not isinstance(given, Real) or given != given):
         raise KnowledgeError(f"{name}={given!r} is no number; wanted {wanted}")
+
+
+def check_noise(noise: float) -> None:
+    """Raise `KnowledgeError` unless the noise of a measurement is a number from 0 to `MOST_NOISE`.
+
+    Examples
+    --------
+    >>> check_noise(-1)
+    Traceback (most recent call last):
+    confab.reasoner.graph.knowledge.KnowledgeError: noise=-1; wanted metres from 0 to 0.05
+    """
+    number("noise", noise, "metres, e.g. 0.002")
+    if not 0 <= noise <= MOST_NOISE:
+        raise KnowledgeError(f"noise={noise:g}; wanted metres from 0 to {MOST_NOISE}")
 
 
 def shipped_queries(graph: KnowledgeGraph | None = None, episodes: bool = True) -> dict[str, str]:

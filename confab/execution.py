@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict
 
-from confab.accepting import AnyPlan, Facts, check_goal, check_seconds, number, plan_of, possible, several
+from confab.accepting import AnyPlan, Facts, check_goal, check_noise, check_seconds, number, plan_of, possible, several
 from confab.formats import EpisodeJson, SeenJson
 from confab.interchange import step_json
 from confab.planner.acting.episode import End, Episode, Event, Intervention, InterventionKind
@@ -575,6 +575,7 @@ def execute(
     texts = list(interventions)
     wanted = [i for i in texts if isinstance(i, Intervention)]
     wanted += parse_interventions(problem, [i for i in texts if isinstance(i, str)])
+    check_noise(noise)
     if noise and world != "pybullet":
         raise KnowledgeError(f"noise of {noise:g} m: only in the world pybullet, since nothing is measured elsewhere")
     if both_hands and (world != "pybullet" or wanted):

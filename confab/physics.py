@@ -9,7 +9,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict
 
-from confab.accepting import check_seconds, number
+from confab.accepting import check_noise, check_seconds, number
 from confab.labels import Labels, labels_of
 from confab.planner.plan import Plan
 from confab.progress import progress
@@ -272,7 +272,7 @@ def verify(
     """
     number("rollouts", rollouts, "how often, e.g. 3")
     number("seed", seed, "an integer")
-    number("noise", noise, "metres, e.g. 0.002")
+    check_noise(noise)
     check_seconds("time_limit", time_limit)
     if rollouts < 1 or rollouts != int(rollouts):
         raise KnowledgeError(f"{rollouts} rollouts can't verify a plan; wanted 1 or more")

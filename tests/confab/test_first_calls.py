@@ -109,6 +109,11 @@ SAID: dict[str, tuple[Callable[[confab.Scene, confab.Result], object], str]] = {
     "two goals in one text": (lambda scene, result: scene.plan(f"{GOAL} and cup1 LOCATION location7"), "by itself"),
     "an update": (lambda scene, result: scene.query("PREFIX : <urn:x>\nINSERT DATA { :a :b :c }"), "is only read"),
     "a film of another format": (lambda scene, result: result.verify(video="film.txt"), "ends in .mp4 or .gif"),
+    "negative noise": (lambda scene, result: result.verify(noise=-1), "wanted metres from 0 to 0.05"),
+    "noise in an execution": (
+        lambda scene, result: scene.execute(world="pybullet", noise=1e308),
+        "wanted metres from 0 to 0.05",
+    ),
     "half a rollout": (lambda scene, result: result.verify(rollouts=1.5), "wanted 1 or more"),  # type: ignore[arg-type]
     "bindings of a query": (
         lambda scene, result: scene.query("SELECT ?o { ?o k:location ?l }", initBindings={}),  # type: ignore[call-arg]
