@@ -1,4 +1,4 @@
-"""Temporal problems of the field: coverage and makespan of Confab, LPG and Tamer, and random timed worlds in a full search.
+"""Temporal problems of the field: coverage and makespan of Confab, LPG and Tamer; random timed worlds in a full search; families.
 
     python -m benchmarks temporal                        with problems in ../shared/temporal
     CONFAB_TEMPORAL=FOLDER python -m benchmarks temporal with problems elsewhere
@@ -6,6 +6,7 @@
     CONFAB_INSTANCES=1,5,12 …                            these instances of each domain only
     CONFAB_PLANNERS=confab,lpg,tamer …                   these planners only
     CONFAB_KINDS=worlds CONFAB_COUNT=1000 …              the random worlds only
+    CONFAB_KINDS=families CONFAB_SIZES=10,40 …           the families only, with these numbers of objects
 
 Each run is a separate process, limited to 30 s of CPU time. Plans of Confab are judged by unified-planning's
 TimeTriggeredPlanValidator, with conflicting events 1 ms apart.
@@ -29,6 +30,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PROBLEMS = Path(os.environ.get("CONFAB_TEMPORAL", ROOT.parent / "shared" / "temporal"))
 EPSILON = Fraction(1, 1000)
 FIRST, COUNT = 20_000, 5_000
+TABLES = ("served", "swap", "handover", "blocked")
 PEER = """
 import json, sys
 from unified_planning.io import PDDLReader
@@ -51,6 +53,39 @@ def main() -> None:
     if "worlds" in kinds:
         _worlds(limited=False)
         _worlds(limited=True)
+    if "families" in kinds:
+        _families()
+
+
+def _families() -> None:
+    """Print the makespans of plans for tables with two and eight hands and for three mobile robots, with bounds and CPU times."""
+    from confab.planner.solve import Request, solve
+    from confab.planner.timed.call import best_in_time, in_time
+    from worlds.deliveries import deliveries
+    from worlds.families import family
+
+    print(
+        "| family | actors | n | steps | makespan of the plan's steps ÷ bound | makespan | bound for these steps "
+        "| makespan ÷ bound | sequential plan, CPU s | schedule, CPU s |"
+    )
+    print("|---" * 10 + "|")
+    for n in map(int, os.environ.get("CONFAB_SIZES", "10,40,100,200").split(",")):
+        for name, actors in [(one, hands) for hands in (2, 8) for one in TABLES] + [("deliveries", 3)]:
+            problem = deliveries(n, actors, 1) if name == "deliveries" else family(name, n, 1, actors)
+            began = process_time()
+            plan = solve(Request(problem)).plan
+            assert plan is not None
+            planned = process_time()
+            timed = best_in_time(problem, plan).plan
+            ended = process_time()
+            plain = in_time(problem, plan).plan
+            assert timed is not None and plain is not None
+            bound = max(timed.bound, timed.least)
+            print(
+                f"| {name} | {actors} | {n} | {len(timed.slots)} | {float(plain.makespan / bound):.3f} | {float(timed.makespan):g} "
+                f"| {float(bound):g} | {float(timed.makespan / bound):.3f} | {planned - began:.1f} | {ended - planned:.1f} |",
+                flush=True,
+            )
 
 
 def _problems() -> None:

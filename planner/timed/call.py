@@ -72,6 +72,7 @@ def best_in_time(problem: Problem, plan: Plan, seconds: float | None = None, sho
 
 def _best(problem: Problem, plan: Plan, seconds: float | None, shorten: bool) -> Timed:
     from confab.planner.timed.sharing import evenly_shared, shared
+    from confab.planner.timed.spreading import spread
 
     until = None if seconds is None else perf_counter() + seconds
 
@@ -79,7 +80,7 @@ def _best(problem: Problem, plan: Plan, seconds: float | None, shorten: bool) ->
         return None if until is None else max(until - perf_counter(), 0.0) / parts
 
     try:
-        first = in_time(problem, plan, left(3))
+        first = in_time(problem, spread(problem, plan) if shorten else plan, left(3))
     except LimitError as limit:
         return Timed(reason=Reason(str(limit)))
     if first.plan is not None and (not shorten or evenly_shared(problem, first.plan.work, first.plan.makespan)):
@@ -90,7 +91,7 @@ def _best(problem: Problem, plan: Plan, seconds: float | None, shorten: bool) ->
         return first
     found = Timed()
     with suppress(LimitError):
-        found = in_time(problem, other, left(1))
+        found = in_time(problem, spread(problem, other) if shorten else other, left(1))
     if first.plan is None and 0 < found.late < first.late:
         return found
     if found.plan is None or (first.plan is not None and first.plan.makespan <= found.plan.makespan):

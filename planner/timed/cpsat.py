@@ -13,8 +13,8 @@ from confab.planner.timed.network import ALWAYS, Network, earliest
 from confab.planner.timed.order import BEGIN, END, Order, TurnId
 from confab.planner.timed.schedules import CandidateSchedule, Choices, durations_with, turn_edges
 
-WORK = 8.0
-"""Maximum deterministic time of the solver; the unit is about a second."""
+WORK = 1.0
+"""Maximum deterministic time of the solver; the unit is a few seconds."""
 LARGEST = 2**40
 """Maximum makespan for which the solver is used, in units of the network."""
 

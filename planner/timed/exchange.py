@@ -59,7 +59,7 @@ def choices_of(problem: Problem, plan: Plan, order: Order, network: Network) -> 
                 names = {actor: other}
                 durations = _durations(problem, rules, facts, order, network, turn.members, names)
                 if durations is not None and all(
-                    _terms(problem, rules, facts, step, names) is not None for step in upper.values()
+                    possible(problem, rules, facts, step, names) is not None for step in upper.values()
                 ):
                     able.append(actors[other])
                     lasts[(resource, number), actors[other]] = durations
@@ -152,10 +152,10 @@ def _whole_steps(plan: Plan, order: Order) -> Callable[[str, Sequence[int]], boo
     return whole
 
 
-def _terms(
+def possible(
     problem: Problem, rules: BehaviorReader, facts: Facts, step: Step, names: Mapping[str, str]
 ) -> dict[str, str] | None:
-    """Return the individuals of a step after its actors are replaced, or None if static facts don't allow the new actors."""
+    """Return the individuals of a step after some are replaced, or None if static facts don't allow the new individuals."""
     behavior = problem.domain.behaviors[step.behavior]
     arguments = tuple(names.get(a, a) for a in step.arguments)
     given = {p.name: a for p, a in zip(behavior.parameters, arguments, strict=True)}
@@ -183,7 +183,7 @@ def _durations(
         if arguments == step.arguments:
             continue
         behavior = problem.domain.behaviors[step.behavior]
-        given = _terms(problem, rules, facts, step, names)
+        given = possible(problem, rules, facts, step, names)
         if given is None:
             return None
         terms = (*arguments, *(given.get(v.name, v.name) for v in pieces_of(problem, behavior).fixed))

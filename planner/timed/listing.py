@@ -1,8 +1,9 @@
 """List scheduling: turns are taken in the order in which they can begin, by the actor that ends them first.
 
-A block consists of the activities that are connected by turns of actors, and of activities between them. The schedule appends one
-block after another. The next block is the block that can begin first; of several, the block with the longest chain of blocks after
-it. A block can be appended if each of its turns finds the resource free. The method is the serial schedule generation scheme
+A block consists of the activities that are connected by turns of actors or by a step of the first level, and of activities between
+them. The schedule appends one block after another, so that the steps of every level could be executed in the order of the blocks.
+The next block is the block that can begin first; of several, the block with the longest chain of blocks after it. A block can be
+appended if each of its turns finds the resource free. The method is the serial schedule generation scheme
 (Kolisch, "Serial and parallel resource-constrained project scheduling methods revisited", EJOR 90, 1996) with blocks.
 """
 
@@ -135,9 +136,12 @@ class Listing:
         graph: networkx.DiGraph[int] = networkx.DiGraph()
         graph.add_nodes_from(range(len(self.order.activities)))
         graph.add_edges_from((i, j) for i, _, j, _ in self.network.edges)
-        for resource in self.order.resources:
-            for turn in resource.turns if resource.actor is not None else ():
-                graph.add_edges_from(zip(turn.members, (*turn.members[1:], turn.members[0]), strict=True))
+        groups = [turn.members for one in self.order.resources if one.actor is not None for turn in one.turns]
+        inside: dict[int, list[int]] = defaultdict(list)
+        for i, activity in enumerate(self.order.activities):
+            inside[activity.step.path[0]].append(i)
+        for its in (*groups, *inside.values()):
+            graph.add_edges_from(zip(its, (*its[1:], its[0]), strict=True))
         return sorted(map(sorted, networkx.strongly_connected_components(graph)))
 
     def graph(self, blocks: Sequence[Sequence[int]]) -> networkx.DiGraph[int]:

@@ -45,13 +45,14 @@ class Turn:
 
 @dataclass(frozen=True)
 class Resource:
-    """A symbol or an actor, with turns that exclude each other, in the order of the sequence.
+    """A symbol, a looked-up set of symbols with a value, or an actor, with turns that exclude each other, as in the sequence.
 
-    `actor` is the name of the actor, or None for a symbol.
+    `actor` is the name of the actor, or None; `value` is the value of a set of symbols, or None.
     """
 
     turns: tuple[Turn, ...]
     actor: str | None = None
+    value: str | None = None
 
 
 @dataclass(frozen=True)
@@ -116,7 +117,7 @@ def order_of(problem: Problem, activities: Sequence[Activity], events: Iterable[
     own: dict[Cell | Key, int] = {c: i for i, actor in enumerate(actors) for c in owned[actor]}
     for one, groups in [*((cell, [records[cell]]) for cell in loose), *free.items()]:
         own[one] = len(resources)
-        resources.append(Resource(_turns(groups, ends)))
+        resources.append(Resource(_turns(groups, ends), value=one[1] if isinstance(one[1], str) else None))
     turn_of = [{m: t for t, turn in enumerate(r.turns) for m in turn.members} for r in resources]
     edges = dict[Edge, None]()
     for cell, found in records.items():

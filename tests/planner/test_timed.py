@@ -62,12 +62,14 @@ def test_two_hands_share_the_work_in_half_the_time_and_that_is_proved() -> None:
     assert [name for name, _ in served().lanes()] == ["left_hand", "right_hand"]
 
 
-def test_hands_that_pass_cups_over_one_place_in_both_directions_work_at_the_same_time() -> None:
-    problem = family("handover", 12, 1)
+def test_hands_pass_cups_in_both_directions_without_waiting_for_places() -> None:
+    problem = family("handover", 4, 1)
     found = plan(problem).plan
     assert found is not None
-    timed = in_time(problem, found).plan
-    assert timed is not None and timed.makespan <= timed.serial * Fraction(3, 5)
+    one, several = in_time(problem, found).plan, best_in_time(problem, found).plan
+    assert one is not None and several is not None
+    assert several.makespan == several.bound == several.serial / 2
+    assert several.makespan < one.makespan <= one.serial * Fraction(3, 4)
 
 
 def test_every_step_spans_its_refinement() -> None:
