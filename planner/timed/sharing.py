@@ -43,7 +43,10 @@ MOST_WORK = 20_000_000
 PLANNING, SCHEDULING = 2_500, 60
 """Work of planning a stretch without its searches, and work of scheduling a primitive; the unit is one operator in one state."""
 BARREN, MOST_BARREN = 10, 150
-"""Maximum number of successive changes without a better schedule: for each task, and in all."""
+"""Maximum number of successive changes without a better schedule: for each task, and in all.
+
+A late schedule is changed up to the second number.
+"""
 BUSY = Fraction(103, 100)
 """A schedule isn't improved further if the makespan times the number of actors is at most this number times the actors' work."""
 MOST_KNOWN = 4
@@ -251,8 +254,8 @@ class _Search:
         now = self.best
         if now is None:
             return
-        random, barren, most = Random(0), 0, min(BARREN * len(now.tasks), MOST_BARREN)
-        while barren < most and now.critical:
+        random, barren = Random(0), 0
+        while barren < (MOST_BARREN if now.cost[0] else min(BARREN * len(now.tasks), MOST_BARREN)) and now.critical:
             if not (self.shorten or now.cost[0]):
                 break
             if not now.cost[0] and evenly_shared(self.problem, now.work, now.cost[1]):
