@@ -44,7 +44,7 @@ from worlds.scenes import scene
 CHECKERS = sorted(f"planner/{file.name}" for file in (ROOT / "planner").glob("checked_*.py"))
 PARTS: dict[str, dict[str, str]] = {
     "recognition": {"reasoner/reading/relevance.py": "recognition"},
-    "proofs": {"planner/hierarchical/unsolvability.py": "guarded", "planner/certifying.py": "proofs"},
+    "proofs": {"planner/hierarchical/unsolvability.py": "guarded proofs", "planner/certifying.py": "proofs"},
     "checker of plans": dict.fromkeys(("planner/validation.py", *CHECKERS), "checker"),
     "checker of certificates": dict.fromkeys(
         ("planner/certificate_checks.py", "planner/possibilities.py"), "certificates"
@@ -322,11 +322,12 @@ def check(world: RandomWorld, meant: Interpreter, mode: str) -> Check:
 
 
 def judged(world: RandomWorld, meant: Interpreter, mode: str) -> list[str]:
-    """Judge a world in a mode of planning, and return the complaints."""
+    """Judge a world in one or several modes, and return the complaints."""
     with TemporaryDirectory() as folder:
-        its = judging.Judge(world, Path(folder), only=mode, meant=meant).judged()
+        every = [judging.Judge(world, Path(folder), only=one, meant=meant).judged() for one in mode.split()]
     hopeless = no_plan(meant)
-    kept = (one for one in (*its.complaints, *its.remarks) if one.kind != "gave-up" or hopeless)
+    said = [one for its in every for one in (*its.complaints, *its.remarks)]
+    kept = (one for one in said if one.kind != "gave-up" or hopeless)
     return sorted({f"{one.kind} {one.mode}" for one in kept})
 
 
