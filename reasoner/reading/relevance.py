@@ -158,8 +158,8 @@ def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
             known, found, looked_up
         )  # a total in the slice depends on all of its facts, even if no behaviour is relevant
     changed = set[str]()
-    before = -1
-    while before != (before := len(counting) + len(changed) + len(looked_up) + sum(map(len, looked_up.values()))):
+    before: tuple[int, ...] = ()
+    while before != (before := (len(counting), len(changed), len(looked_up), sum(map(len, looked_up.values())))):
         for one in doing:
             if one.behavior.changes & counting:
                 one.follow(known, found, looked_up)
