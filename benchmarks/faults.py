@@ -123,11 +123,11 @@ LABORATORY = (
     Planted("lid falls shut when let go", faults.sprung("cover", 0.0, 2.0), 0, "stuck", ("cover",), scene=SPINNER),
     Planted("lid shut by a person meanwhile", faults.swung("cover", 0.0, 4, 0.0), 4, "tracking error", ("cover",), scene=SPINNER),
     Planted("slot occupied", faults.stranger((0.57, 0.15, 0.74), SMALL), 4, "goal in collision", ("stranger",), scene=SPINNER),
-    Planted("lid not shut", faults.stopped("cover", 0.3, 2.0, 15, 0.0), 15, "slip or drop", ("cover",), scene=SPINNER),
-    Planted("lid springs open again", faults.sprung("cover", 0.5, 3.0, 15, 4.0), 15, "stuck", ("cover",), scene=SPINNER),
-    Planted("button not latched", faults.unlatched("start"), 16, "stuck", ("start",), scene=SPINNER),
-    Planted("button stuck", faults.stiff("start", 200.0), 16, "stuck", ("start",), scene=SPINNER),
-    Planted("button's value read 1 cm too low", faults.misread("start", -0.01), 16, "stuck", ("start",), scene=SPINNER),
+    Planted("lid not shut", faults.stopped("cover", 0.3, 2.0, 13, 0.0), 13, "slip or drop", ("cover",), scene=SPINNER),
+    Planted("lid springs open again", faults.sprung("cover", 0.5, 3.0, 13, 4.0), 13, "stuck", ("cover",), scene=SPINNER),
+    Planted("button not latched", faults.unlatched("start"), 14, "stuck", ("start",), scene=SPINNER),
+    Planted("button stuck", faults.stiff("start", 200.0), 14, "stuck", ("start",), scene=SPINNER),
+    Planted("button's value read 1 cm too low", faults.misread("start", -0.01), 14, "stuck", ("start",), scene=SPINNER),
 )  # fmt: skip
 
 PLANTED = (*ON_A_TABLE, *KITCHEN, *LABORATORY)

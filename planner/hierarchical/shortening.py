@@ -91,7 +91,7 @@ def shorten_once(call: Call, work: int, leave_levels: bool, advised: Callable[[C
     if aside:
         drop_detours(call, levels[-2])
     detours = drop_detours(call, levels[-1])
-    if aside or detours or call.given_up or len(levels) == 1 or costs_depend(call):
+    if aside or detours or call.given_up or len(levels) == 1 or costs_depend(call) or restores(call):
         for level in levels[1:] or levels:
             windowed(call, level, work)
 
@@ -109,6 +109,32 @@ def prices(call: Call) -> int:
 def cost(call: Call) -> float:
     """Return the quantity that shortening minimises: the cost of a call's primitives and, among equal costs, their number."""
     return compared(call.problem, primitives(call.steps))
+
+
+def restores(call: Call) -> bool:
+    """Return whether a refinement begins with the inverse of the last change of an earlier refinement.
+
+    Several steps that are refined together can do without both changes.
+    """
+    table, situations = call.table, call.problem.domain.situations
+    last = dict[Cell, tuple[str, str]]()
+    table.undo(0)
+    for step in call.steps:
+        call.space.check_time()
+        mark = len(table.trail)
+        call.refiner.replay(step)
+        values = dict[Cell, list[str]]()
+        for situation, key, old in table.trail[mark:]:
+            if situations[situation].level > step.level:
+                values.setdefault((situation, key), []).append(old)
+        for (situation, key), found in values.items():
+            found.append(table.now[situation][key])
+            if last.get((situation, key)) == (found[1], found[0]) != (found[0], found[1]):
+                table.undo(0)
+                return True
+            last[situation, key] = (found[-2], found[-1])
+    table.undo(0)
+    return False
 
 
 def puts_aside(call: Call) -> bool:

@@ -130,3 +130,10 @@ def test_a_large_library_needs_no_more_tours_than_the_capacity_of_the_cart_requi
     plan = confab.load("library-large").plan().plan
     assert plan.length[1] == 12
     assert plan.length[2] <= 45
+
+
+@pytest.mark.parametrize(("scene", "most"), [("centrifuge", 15), ("two-tables", 26)])
+def test_a_change_that_each_refinement_would_undo_is_made_once_for_several_steps(scene: str, most: int) -> None:
+    plan = confab.load(scene).plan().plan
+    assert len(plan.primitives) <= most
+    assert any(step.joined for step in plan.steps)
