@@ -453,7 +453,8 @@ def _namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member])
     The candidates are looked up by their whole IRIs. An individual is included only if a class of the individual is stated. A class
     is included only if it has individuals besides the nodes that describe behaviours.
     """
-    terms = {iri for individual, kind, _ in members for iri in (individual, kind)} - schema.nodes.keys()
+    classes = {*schema.supers, *chain.from_iterable(schema.supers.values())}
+    terms = ({iri for individual, kind, _ in members for iri in (individual, kind)} | classes) - schema.nodes.keys()
     endings = {local_name(iri) for iri in terms}
     check(RECOGNISING)
     candidates = {space + ending for space in _spaces(graph, schema, terms) for ending in endings} - terms
