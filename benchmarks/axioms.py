@@ -25,7 +25,7 @@ from time import process_time
 from benchmarks.pddl import peers, planners, run
 from confab.planner.plan import Limits, Status
 from confab.planner.solve import Request, solve
-from confab.planner.validation import Facts
+from confab.planner.validation import LoggedState
 from confab.reasoner.derivation import circular
 from confab.reasoner.graph.knowledge import load
 from confab.reasoner.pddl.exporting import to_pddl
@@ -107,7 +107,7 @@ def downward(domain: str, problem: str, command: list[str]) -> int | None:
 def deepest(problem: Problem) -> int:
     """Return the length of the longest chain of a transitive situation type in the initial state."""
     name = "INSIDE" if "INSIDE" in problem.domain.rules else "WAY"
-    facts, (one, other) = Facts(problem, problem.initial), problem.domain.situations[name].arguments
+    facts, (one, other) = LoggedState(problem, problem.initial), problem.domain.situations[name].arguments
     return max(sum(facts.value(name, (a, b)) == TRUE for b in problem.classes[other]) for a in problem.classes[one])
 
 

@@ -29,9 +29,9 @@ from confab.planner.timed.call import best_in_time, timed_plan
 from confab.planner.timed.dispatch import Dispatch, simulated
 from confab.planner.timed.network import earliest, network_of
 from confab.planner.timed.plan import TimedPlan
-from confab.planner.timed.schedules import Choices, durations_with, least, shortest, turn_edges
+from confab.planner.timed.schedules import ActorChoices, durations_with, least, shortest, turn_edges
 from confab.planner.timed.validation import validate_timed
-from confab.planner.validation import BehaviorReader, Facts
+from confab.planner.validation import BehaviorReader, LoggedState
 from confab.reasoner.symbols import Problem, Symbol, Times
 from confab.reasoner.timing import only_during
 from worlds.deliveries import deliveries
@@ -123,7 +123,7 @@ def _planned(problem: Problem, rng: Random) -> Iterator[tuple[Problem, TimedPlan
 
 def _reached(problem: Problem, timed: TimedPlan) -> dict[Symbol, Fraction]:
     """Return the time of the last change of each goal, in a plan whose effects are at the end."""
-    rules, facts = BehaviorReader(problem), Facts(problem, problem.initial)
+    rules, facts = BehaviorReader(problem), LoggedState(problem, problem.initial)
     found: dict[Symbol, Fraction] = {}
     for slot in timed.slots:
         for situation, key, value in (
@@ -193,7 +193,7 @@ def _hindsight(planned: Dispatch, factors: list[Fraction]) -> tuple[bool, bool, 
     lasts = {
         key: {m: int(its * factors[m] * scale) for m, its in by.items()} for key, by in planned.choices.lasts.items()
     }
-    choices = Choices(planned.choices.of, lasts)
+    choices = ActorChoices(planned.choices.of, lasts)
     same = earliest(network, turn_edges(order, planned.turns))
     assert same is not None
     events = planned.problem.times.events if planned.problem.times else {}
@@ -201,7 +201,7 @@ def _hindsight(planned: Dispatch, factors: list[Fraction]) -> tuple[bool, bool, 
     bound, costs = least(order, network, choices), same.cost
     while (best := shortest(order, network, choices, inf, bound)) is not None:
         lasting = replace(network, durations=durations_with(network, choices, best.turns))
-        no_more = Choices({}, {key: {} for key in choices.lasts})
+        no_more = ActorChoices({}, {key: {} for key in choices.lasts})
         timed = timed_plan(planned.problem, planned.plan, order, lasting, no_more, best)
         if timed is not None and not validate_timed(untimed, timed, executed=True):
             costs = min(costs, best.begins.cost)

@@ -27,7 +27,7 @@ from confab.planner.acting.failure_memory import Caution
 from confab.planner.acting.repair import difference, repair_or_replan, replan
 from confab.planner.acting.retries import RetryPolicy
 from confab.planner.acting.symbolic_world import SymbolicWorld, disturbed, with_individual
-from confab.planner.acting.world import Report
+from confab.planner.acting.world import WorldReport
 from confab.planner.hierarchical.planner import compiled
 from confab.planner.plan import Limits, Plan, Step
 from confab.planner.plan_costs import cost_of
@@ -359,12 +359,12 @@ def _obstructed(problem: Problem, learns: bool, seed: int, episodes: int, retry_
         if s.arguments[0] == reach.arguments[0] and s.bindings.get("place") and _is_source(problem, s)
     )
 
-    def fault(step: Step, state: State) -> Report | None:
+    def fault(step: Step, state: State) -> WorldReport | None:
         hit = (
             step.arguments == first.arguments
             and state[Symbol(_where(problem), first.arguments[1:])] == first.bindings["place"]
         )
-        return Report(False, "no path", first.arguments[1:]) if hit and random.random() < 0.9 else None
+        return WorldReport(False, "no path", first.arguments[1:]) if hit and random.random() < 0.9 else None
 
     for _ in range(episodes):
         episode = act(problem, SymbolicWorld(problem, fault=fault), retry_policy=retry_policy, caution=caution)

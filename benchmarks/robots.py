@@ -20,7 +20,7 @@ from typing import Any
 import confab
 from confab.connecting import connected
 from confab.execution import Execution, execute
-from confab.planner.acting.world import Report
+from confab.planner.acting.world import WorldReport
 from confab.planner.plan import Limits, Step
 from confab.scene import Scene
 from confab.sim.robots.adapter import InterfaceWorld
@@ -64,7 +64,7 @@ class Watched(InterfaceWorld):
     due = -1
     hand: Callable[[Any], str] | None = None
 
-    def execute(self, step: Step) -> Report:
+    def execute(self, step: Step) -> WorldReport:
         """Execute a primitive; before the chosen primitive, disturb the world."""
         self.due -= 1
         world = self.transport.world  # type: ignore[attr-defined]

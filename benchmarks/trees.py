@@ -18,7 +18,7 @@ import confab
 from confab.planner.acting.episode import End
 from confab.planner.acting.executive import act
 from confab.planner.acting.symbolic_world import SymbolicWorld
-from confab.planner.acting.world import Report
+from confab.planner.acting.world import WorldReport
 from confab.planner.behavior_tree import Situation
 from confab.planner.plan import Plan, Step
 from confab.planner.validation import open_goals
@@ -46,7 +46,7 @@ class Undone(SymbolicWorld):
         super().__init__(problem)
         self.left, self.draw = after, draw
 
-    def execute(self, step: Step) -> Report:
+    def execute(self, step: Step) -> WorldReport:
         """Execute a primitive; after the chosen primitive, undo a change."""
         said = super().execute(step)
         self.left -= 1

@@ -43,7 +43,7 @@ Facts = Annotated[
 Seconds = Annotated[float, Field(description="Time limit in seconds", gt=0, le=MOST_SECONDS)]
 
 
-class Kept:
+class KeptTexts:
     """The complete texts of the last `KEPT` answers that were cut, by number."""
 
     def __init__(self) -> None:
@@ -118,7 +118,7 @@ def server(folder: Path) -> MCPServer[Any]:
         instructions="Plans of a robot from an ontology, with reasons, proofs of unsolvability, and checks in physics.",
         log_level="ERROR",
     )
-    kept = Kept()
+    kept = KeptTexts()
 
     async def answered(function: Callable[..., str], *arguments: object, seconds: float) -> str:
         processes: list[Popen[bytes]] = []

@@ -18,7 +18,7 @@ from confab.planner.paper.transitions import ground
 from confab.planner.solve import Mode
 from confab.reasoner.files import STDOUT, alone, made_folder, write_whole
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.memory.experience_file import Lines
+from confab.reasoner.memory.experience_file import MemoryLines
 from confab.reasoner.names import local_name, nearest
 from confab.reasoner.vocabulary import ARGUMENTS, CORE
 from confab.show import bindings_of
@@ -223,7 +223,7 @@ def _lines(scene: Scene, mode: Mode) -> tuple[str, ...]:
 # ------------------------------------------------------------------------------------------------------- memory and renames
 
 
-def unknown_terms(memory: Lines, scene: Known) -> list[str]:
+def unknown_terms(memory: MemoryLines, scene: Known) -> list[str]:
     """Return the terms of the domain that a memory mentions and the scene doesn't contain.
 
     Each term is mapped to the most similar name in the scene.

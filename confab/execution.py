@@ -442,7 +442,7 @@ class Execution(metaclass=RightNames):
         return styled(tag("p", self.summary()), tree(self.episode.done, labels, self.notes()))
 
 
-class Options(TypedDict, total=False):
+class ExecuteKeywords(TypedDict, total=False):
     """Further options of `execute`."""
 
     prepare: Callable[[PhysicsWorld], None] | None
@@ -465,7 +465,7 @@ def carry_out(
     observer: Callable[[Event], None] | None = None,
     watch: bool = False,
     time_limit: float | None = None,
-    **options: Unpack[Options],
+    **options: Unpack[ExecuteKeywords],
 ) -> Execution:
     """Execute a task with the arguments of `confab.scene.Scene.execute`."""
     from confab.live import spectator

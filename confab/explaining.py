@@ -16,7 +16,7 @@ from confab.planner.experience.following import RulePolicy
 from confab.planner.experience.instances import RuleInstance
 from confab.planner.hierarchical.call import Call, compiled
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.memory.experience import ITSELF, Fact, Ground, Tally
+from confab.reasoner.memory.experience import ITSELF, Ground, RoleFact, Tally
 from confab.reasoner.symbols import Problem
 
 if TYPE_CHECKING:
@@ -217,7 +217,7 @@ def _differences(
     chosen: RuleInstance, other: RuleInstance, advisor: Advisor, reader: FactReader, say: Sayings
 ) -> tuple[Why, ...]:
     """Return the differences between the cogencies (scores) of two rule instances, fact by fact, the greatest difference first."""
-    facts: list[dict[str, tuple[Fact, float]]] = []
+    facts: list[dict[str, tuple[RoleFact, float]]] = []
     for c in (chosen, other):
         factors = advisor.scorer.factors(c.rule, reader.facts(c.rule, c.roles), reader.individuals(c.rule, c.roles))
         facts.append({f.fact[0]: (f.fact, f.weight) for f in factors})

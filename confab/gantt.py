@@ -7,7 +7,7 @@ from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING
 
-from confab.planner.acting.schedule import Slot
+from confab.planner.acting.schedule import WorkerSlot
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -19,7 +19,7 @@ TALL, LINES = 21, 2.8
 
 
 def save_gantt(
-    slots: Sequence[Slot], path: str | Path, serial: float | None = None, labels: Labels | None = None
+    slots: Sequence[WorkerSlot], path: str | Path, serial: float | None = None, labels: Labels | None = None
 ) -> Path:
     """Draw a schedule as a Gantt chart into a picture file, and return the path.
 
@@ -31,7 +31,7 @@ def save_gantt(
         return save(_gantt(slots, serial, labels), Path(path), dpi=110)
 
 
-def _gantt(slots: Sequence[Slot], serial: float | None, labels: Labels | None) -> Figure:
+def _gantt(slots: Sequence[WorkerSlot], serial: float | None, labels: Labels | None) -> Figure:
     from matplotlib import colormaps
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from confab.labels import Labels
 from confab.reasoner.amounts import LESS, MORE
-from confab.reasoner.memory.experience import GoalKind, LearnedRule, Method, Order, Said
+from confab.reasoner.memory.experience import GoalKind, LearnedItem, LearnedOrder, LearnedRule, Method
 from confab.reasoner.sentences import said as plainly
 from confab.reasoner.symbols import (
     Condition,
@@ -94,12 +94,12 @@ class Sayings:
         when = f", when {', '.join(asks[:MOST_SAID])}{more}" if asks else ""
         return f"so that {self.goal(rule)}{when}: {self.step(*rule.does)}"
 
-    def said(self, one: Said) -> str:
+    def said(self, one: LearnedItem) -> str:
         """Return a learned rule, order of goals, method or kind of goal as a sentence."""
         match one:
             case LearnedRule():
                 return self.rule(one)
-            case Order(first, then, shared):
+            case LearnedOrder(first, then, shared):
                 same = " of the same individual" if shared else ""
                 return f"{self.name(first)} before {self.name(then)}{same}"
             case Method(behavior, _, steps, _):

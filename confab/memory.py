@@ -23,16 +23,25 @@ from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.memory.experience import (
     ITSELF,
     Experience,
-    Fact,
     GoalKind,
+    LearnedOrder,
     LearnedRule,
     LearningError,
     Method,
-    Order,
+    RoleFact,
     Statistics,
     Tally,
 )
-from confab.reasoner.memory.experience_file import FORMAT, Lines, new_replica, parse, probability, pull, push, turtle
+from confab.reasoner.memory.experience_file import (
+    FORMAT,
+    MemoryLines,
+    new_replica,
+    parse,
+    probability,
+    pull,
+    push,
+    turtle,
+)
 from confab.reasoner.memory.links import Links
 from confab.reasoner.memory.links_file import links_text, load_links, memory_lines, memory_names
 from confab.reasoner.names import Names, RightNames, right_names
@@ -108,7 +117,7 @@ class Memory(metaclass=RightNames):
 
     @classmethod
     def load(
-        cls, source: str | Path, scene: Known | None = None, trust: bool = False, lines: Lines | None = None
+        cls, source: str | Path, scene: Known | None = None, trust: bool = False, lines: MemoryLines | None = None
     ) -> Memory:
         """Read a memory file, or the memories at a SPARQL endpoint.
 
@@ -120,7 +129,7 @@ class Memory(metaclass=RightNames):
             The scene whose short names are used for the terms of the memory.
         trust : bool
             Whether the experience of every replica is trusted.
-        lines : Lines, optional
+        lines : MemoryLines, optional
             The lines of the file, if the caller has read them with `confab.reasoner.memory.links_file.memory_lines`.
 
         Raises
@@ -414,7 +423,7 @@ class Memory(metaclass=RightNames):
         links = f"{counted(len(self.links), 'link')} of {counted(len(self.links.tables), 'behaviour')}"
         kinds = [
             counted(sum(isinstance(one, kind) for one in self.experience.said.values()), noun)
-            for kind, noun in ((LearnedRule, "rule"), (Order, "order of goals"), (Method, "method"))
+            for kind, noun in ((LearnedRule, "rule"), (LearnedOrder, "order of goals"), (Method, "method"))
         ]
         kinds[1] = kinds[1].replace("order of goalss", "orders of goals")
         return f"{lived} so far: {', '.join(kinds)}; of the paper's memory {links}."
@@ -445,7 +454,7 @@ def _labels(scene: Known) -> Callable[[], Labels]:
     return read
 
 
-def preferred(say: Sayings, facts: Mapping[Fact, tuple[float, float]]) -> list[str]:
+def preferred(say: Sayings, facts: Mapping[RoleFact, tuple[float, float]]) -> list[str]:
     """Return the strongest recent preferences between individuals as sentences, the strongest first."""
     clear = sorted(((abs(c - p), say.asked(fact, {}), c - p) for fact, (c, p) in facts.items()), reverse=True)
     return [f"{'lately' if lead > 0 else 'not lately'} {text}" for by, text, lead in clear[:SHOWN] if by >= 0.5]
@@ -502,4 +511,4 @@ def failed_steps(problem: Problem, episode: Episode) -> Iterator[tuple[Problem, 
                 break
 
 
-__all__ = ["FORMAT", "GoalKind", "Memory", "Order", "probability"]
+__all__ = ["FORMAT", "GoalKind", "LearnedOrder", "Memory", "probability"]

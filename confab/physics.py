@@ -205,7 +205,7 @@ class Report(metaclass=RightNames):
         return styled(tag("p", self.summary()), film, tree(self.plan, labels, self.notes()))
 
 
-class Options(TypedDict, total=False):
+class VerifyKeywords(TypedDict, total=False):
     """Further options of `verify`."""
 
     perturb: bool

@@ -63,7 +63,7 @@ CHOICE_WORK = 2_000_000
 
 
 @dataclass(frozen=True)
-class Task:
+class PlanningTask:
     """The task of one planning call.
 
     `reading` contains the individuals that the task can need, or the whole scene; `problem` is its problem with the goals of the
@@ -124,7 +124,7 @@ class Searching(NamedTuple):
 
 def read_task(
     scene: Known, goals: list[str], memory: Memory | Links | None, options: PlanOptions, deadline: Deadline
-) -> Task:
+) -> PlanningTask:
     """Read the task of a planning call; the paper's mode and observed facts require the whole scene."""
     grounds, paper = None, options.strategy == "paper"
     if paper or options.observed is not None:
@@ -142,10 +142,10 @@ def read_task(
 
         grounds = {level: quantify(scene.knowledge, reading, level) for level in reading.problem.domain.levels}
     scene.knowledge.confirm()
-    return Task(scene, goals, memory, options, deadline, reading, problem, grounds)
+    return PlanningTask(scene, goals, memory, options, deadline, reading, problem, grounds)
 
 
-def planned(task: Task) -> Found:
+def planned(task: PlanningTask) -> Found:
     """Plan, and schedule the plan if the task asks for times."""
     problem, part = task.problem, None if task.reading.whole else task.reading
     faulty = [*never_done(problem)]
@@ -174,7 +174,7 @@ def planned(task: Task) -> Found:
     return Found(problem, outcome, timed, part, task.options.strategy == "optimal")
 
 
-def stands(task: Task, outcome: Outcome) -> bool:
+def stands(task: PlanningTask, outcome: Outcome) -> bool:
     """Return whether an outcome for a part of the scene may hold in the whole scene: no proof, and no plan with faults there."""
     if outcome.status is Status.UNSOLVABLE:
         return False
@@ -182,7 +182,9 @@ def stands(task: Task, outcome: Outcome) -> bool:
     return not (plan and refused(knowledge, task.reading, plan, task.goals, outcome.unmet))
 
 
-def searched_without(task: Task, problem: Problem, faulty: Sequence[tuple[Behavior, str]]) -> tuple[Problem, Outcome]:
+def searched_without(
+    task: PlanningTask, problem: Problem, faulty: Sequence[tuple[Behavior, str]]
+) -> tuple[Problem, Outcome]:
     """Search without behaviours that no plan can contain; if there is no plan without them, the first reason is an error."""
     possible = without(problem, [behavior for behavior, _ in faulty])
     behavior, why = faulty[0]
@@ -207,7 +209,7 @@ def none_at_all(problem: Problem, deadline: Deadline) -> bool:
 # ------------------------------------------------------------------------------------------------------------- searching
 
 
-def searched(task: Task, problem: Problem) -> tuple[Problem, Outcome]:
+def searched(task: PlanningTask, problem: Problem) -> tuple[Problem, Outcome]:
     """Search, and choose among soft goals; return the problem with the chosen goals, and the outcome."""
     mode = task.options.strategy
     finish = partial(search, task, how=Searching(mode))
@@ -231,14 +233,14 @@ def searched(task: Task, problem: Problem) -> tuple[Problem, Outcome]:
     return replace(problem, goal=chosen.goal, weights=chosen.weights), outcome
 
 
-def search_in_time(task: Task, how: Searching, least: float, limit: str, problem: Problem) -> Outcome:
+def search_in_time(task: PlanningTask, how: Searching, least: float, limit: str, problem: Problem) -> Outcome:
     """Search; if fewer than `least` seconds are left, raise `LimitError` with the name of the limit."""
     if task.deadline.left is not None and task.deadline.left < least:
         raise LimitError(limit)
     return search(task, problem, how)
 
 
-def search(task: Task, problem: Problem, how: Searching) -> Outcome:
+def search(task: PlanningTask, problem: Problem, how: Searching) -> Outcome:
     """Search with the named engine, or with Confab's own search and then an installed engine."""
     options, deadline = task.options, task.deadline
     deadline.check("reading the problem")
@@ -256,7 +258,7 @@ def search(task: Task, problem: Problem, how: Searching) -> Outcome:
     return by_installed_engine(problem, deadline, outcome, again)
 
 
-def own_request(task: Task, problem: Problem, how: Searching, engines: bool) -> Request:
+def own_request(task: PlanningTask, problem: Problem, how: Searching, engines: bool) -> Request:
     """Return the request for Confab's own search; if engines or scheduling may follow, a part of the time is kept for them."""
     options, seconds, memory = task.options, task.deadline.left, task.memory
     if seconds is not None:

@@ -22,7 +22,7 @@ OPTIMAL_SECONDS = 10.0
 """Default time limit of the search for an optimal plan in seconds."""
 
 
-class Options(TypedDict, total=False):
+class PlanKeywords(TypedDict, total=False):
     """The fields of `PlanOptions` as keywords."""
 
     memory: Memory | Links | str | Path | None

@@ -263,7 +263,7 @@ class Result(metaclass=RightNames):
             raise KnowledgeError(f"the plan can't be done in that order: {faults[0].text}")
         return plan
 
-    def verify(self, rollouts: int = 1, seed: int = 0, **options: Unpack[physics.Options]) -> Report:
+    def verify(self, rollouts: int = 1, seed: int = 0, **options: Unpack[physics.VerifyKeywords]) -> Report:
         """Verify the plan in PyBullet (`confab.physics.verify`)."""
         from confab.physics import verify
 
@@ -281,7 +281,7 @@ class Result(metaclass=RightNames):
         observer: Callable[[Event], None] | None = None,
         watch: bool = False,
         time_limit: float | None = None,
-        **options: Unpack[execution.Options],
+        **options: Unpack[execution.ExecuteKeywords],
     ) -> Execution:
         """Execute the task in a closed loop, beginning with this plan (`Scene.execute`)."""
         from confab.execution import carry_out

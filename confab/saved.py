@@ -12,6 +12,7 @@ from confab.interchange import step_from
 from confab.known import Known
 from confab.planner.acting.discovery import Discovery
 from confab.planner.acting.episode import (
+    BeliefChange,
     End,
     Episode,
     ExecutedPrimitive,
@@ -19,7 +20,6 @@ from confab.planner.acting.episode import (
     Intervention,
     InterventionKind,
     Replan,
-    Seen,
     Surprise,
     situation,
 )
@@ -59,7 +59,7 @@ def read_episode(scene: Known, path: Path) -> Execution:
             raise KnowledgeError(f"{path}: is an episode of {data['scene']}; load that scene")
         people, late, problem = _interventions(scene.problem, data)
         initial = {_symbol(one): str(one["value"]) for one in data["initial"]}
-        course = tuple(Seen(float(one["seconds"]), _symbol(one), one["value"]) for one in data["course"])
+        course = tuple(BeliefChange(float(one["seconds"]), _symbol(one), one["value"]) for one in data["course"])
         symbols = {str(s): s for s in (*initial, *(seen.symbol for seen in course), *problem.goal)}
         events = tuple(_event(one, symbols, path, problem) for one in data["events"])
         done = {event.step.path: event.step for event in events}

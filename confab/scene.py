@@ -108,7 +108,7 @@ class Scene(Known):
         return shown
 
     def verify(
-        self, plan: AnyPlan | None = None, rollouts: int = 1, seed: int = 0, **options: Unpack[physics.Options]
+        self, plan: AnyPlan | None = None, rollouts: int = 1, seed: int = 0, **options: Unpack[physics.VerifyKeywords]
     ) -> Report:
         """Verify a plan, or the plan of a result, in PyBullet (`confab.physics.verify`).
 
@@ -134,7 +134,7 @@ class Scene(Known):
         observer: Callable[[Event], None] | None = None,
         watch: bool = False,
         time_limit: float | None = None,
-        **options: Unpack[execution.Options],
+        **options: Unpack[execution.ExecuteKeywords],
     ) -> Execution:
         """Execute the task in a closed loop of action and observation (`confab.execution.execute`).
 
@@ -271,7 +271,7 @@ class Scene(Known):
 
         return export_pddl(self.problem, level, Path(folder))
 
-    def explain(self, goals: Facts = (), *, goal: Facts = (), **options: Unpack[plan_options.Options]) -> Account:
+    def explain(self, goals: Facts = (), *, goal: Facts = (), **options: Unpack[plan_options.PlanKeywords]) -> Account:
         """Plan with the parameters of `plan`. Return why each step is in the plan, or why there is no plan.
 
         Raises

@@ -214,7 +214,7 @@ class Service:
             return json.dumps(self.sheet.answer(turned)).encode()
 
 
-class Guard:
+class RequestFilter:
     """Middleware that refuses requests from other machines and from web pages of other sites."""
 
     def __init__(self, app: ASGIApp) -> None:
@@ -251,7 +251,7 @@ class Endpoint:
                 Route("/sparql", self.sparql, methods=["GET", "POST"]),
             ],
             middleware=[
-                Middleware(Guard),
+                Middleware(RequestFilter),
                 Middleware(CORSMiddleware, allow_methods=("GET", "POST"), allow_origin_regex=ORIGIN),
             ],
             exception_handlers={HTTPException: refused, Exception: fault},

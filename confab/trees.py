@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from confab.planner.acting.world import World
-from confab.planner.behavior_tree import All, Do, First, Holds, Mark, Marked, Node, Situation, Subtree, Together
+from confab.planner.behavior_tree import All, Do, First, Holds, Mark, Marked, Situation, Subtree, Together, TreeNode
 from confab.planner.behavior_tree import behavior_tree as tree_of
 from confab.planner.plan import Plan, Step
 from confab.reasoner.files import check_replaceable, made_folder, write_whole
@@ -88,7 +88,7 @@ class Tree:
 
 def behavior_tree(problem: Problem, plan: Plan) -> Tree:
     """Return the behaviour tree of a valid plan, with nodes that both BehaviorTree.CPP and py_trees support."""
-    lowering = _Lowering(problem)
+    lowering = _ElementWriter(problem)
     lowering.lowered(tree_of(problem, plan))
     return Tree(lowering.subtrees, lowering.leaves, frozenset(lowering.possible))
 
@@ -105,7 +105,7 @@ def export_trees(problem: Problem, plan: Plan, folder: Path) -> tuple[Path, Path
     return paths
 
 
-class _Lowering:
+class _ElementWriter:
     """Conversion of the nodes of a plan's behaviour tree into elements, in which leaves are numbered."""
 
     def __init__(self, problem: Problem) -> None:
@@ -114,7 +114,7 @@ class _Lowering:
         self.leaves: dict[str, Fact | Condition | Step] = {}
         self.possible: set[str] = set()
 
-    def lowered(self, node: Node) -> Element:
+    def lowered(self, node: TreeNode) -> Element:
         """Return the element of a library for a node of the plan's behaviour tree."""
         check("exporting the behaviour tree")
         match node:

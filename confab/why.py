@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, TypeAlias
 from confab.formats import AccountJson, BecauseJson, WhyNotJson
 from confab.labels import Labels
 from confab.page.markup import Markup, styled, tag
-from confab.planner.causal_links import FactChange, Kind, Need, Purpose
+from confab.planner.causal_links import FactChange, Need, NeedKind, Purpose
 from confab.planner.contrast import Ask, Contrast, NoChoiceError, instead_of, with_choice
-from confab.planner.finding import Place, UnknownStepError, find
+from confab.planner.finding import StepPosition, UnknownStepError, find
 from confab.planner.finding import numbers as numbered
 from confab.planner.levels import levels_left
 from confab.planner.plan import Outcome, Plan, Status, Step
@@ -232,7 +232,7 @@ class Account:
 
 def numbers(plan: Plan) -> dict[tuple[int, ...], str]:
     """Return the numbers of all steps by path."""
-    return numbered(Place(step.path, step.level, step.id, ()) for step in plan.walk())
+    return numbered(StepPosition(step.path, step.level, step.id, ()) for step in plan.walk())
 
 
 def find_step(plan: Plan, asked: int | str | Sequence[int | str] | Step, labels: Labels) -> Step:
@@ -245,7 +245,7 @@ def find_step(plan: Plan, asked: int | str | Sequence[int | str] | Step, labels:
     """
     steps = {step.path: step for step in plan.walk()}
     texts = {path: (str(step), labels.name(step.behavior), labels.step(step)) for path, step in steps.items()}
-    places = [Place(path, step.level, step.id, texts[path]) for path, step in steps.items()]
+    places = [StepPosition(path, step.level, step.id, texts[path]) for path, step in steps.items()]
     hint = f"steps: {some_of([text for *_, text in texts.values()])}"
     asked = asked.path if isinstance(asked, Step) else asked
     if not isinstance(asked, int | str | Sequence):
@@ -324,15 +324,15 @@ def account(plan: Plan, purposes: Mapping[tuple[int, ...], Purpose], labels: Lab
 
 def _sentence(need: Need, steps: Steps, number: Mapping[Path, str], labels: Labels) -> str:
     facts = " and ".join(labels.fact(change.fact) for change in need.gives)
-    if need.kind is Kind.GOAL and need.conditions:
+    if need.kind is NeedKind.GOAL and need.conditions:
         return f"the goal requires that {' and '.join(map(labels.condition, need.conditions))}, which follows from: {facts}"
-    if need.kind is Kind.GOAL:
+    if need.kind is NeedKind.GOAL:
         return f"the goal requires that {facts}"
-    if need.kind is Kind.REST:
+    if need.kind is NeedKind.REST:
         where = f"“{labels.step(steps[need.by])}”" if need.by else "the plan"
         return f"{where} has to end with the rest value: {facts}"
     by = f"“{labels.step(steps[need.by])}” ({number[need.by]})"
-    if need.kind is Kind.ABOVE:
+    if need.kind is NeedKind.ABOVE:
         return f"it achieves an effect of {by}: {facts}"
     asks = " and ".join(labels.condition(condition) for condition in need.conditions)
     if not asks:

@@ -17,7 +17,7 @@ from confab.reasoner.kinds import IMPORTED, stamped
 from confab.reasoner.names import nearest
 from confab.reasoner.vocabulary import CORE, LABEL, OWL, RDF, RDFS, XSD
 from confab.scene import load
-from confab.sim.robots.transport import Model, RobotError
+from confab.sim.robots.transport import RobotError, WorldModel
 
 MODEL, LINK = "https://w3id.org/confab/model#", "https://w3id.org/confab/model/link#"
 """Namespaces of the properties for the fields of a world model: the first for fields with literals, the second for fields that
@@ -66,7 +66,7 @@ def scene_of_world(on: str, path: Path, seed: int = 0, title: str = "") -> int:
     return count
 
 
-def scene_text(interface: Interface, model: Model, name: str, title: str) -> tuple[str, int]:
+def scene_text(interface: Interface, model: WorldModel, name: str, title: str) -> tuple[str, int]:
     """Return the scene that an interface's scene query constructs from a world model, as Turtle, and the number of individuals.
 
     Raises
@@ -141,7 +141,7 @@ def _interfaces() -> Mapping[str, Path]:
 # ------------------------------------------------------------------------------------------------------------- world models
 
 
-def _triples(model: Model, namespace: str) -> Iterator[ox.Triple]:
+def _triples(model: WorldModel, namespace: str) -> Iterator[ox.Triple]:
     """Yield a world model as triples, with an individual for each entity and a property for each field."""
     nodes = {entity: ox.NamedNode(namespace + as_iri_part(entity)) for entity in model}
     for entity, fields in model.items():

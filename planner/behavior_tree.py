@@ -20,9 +20,9 @@ from typing import TypeAlias
 import networkx
 
 from confab.planner.acting.schedule import PartialOrder, partial_order, worker_of, workers_of
-from confab.planner.causal_links import FactChange, Kind, Need, Purpose, purposes
+from confab.planner.causal_links import FactChange, Need, NeedKind, Purpose, purposes
 from confab.planner.plan import Plan, Step
-from confab.planner.validation import BehaviorReader, Facts, successor
+from confab.planner.validation import BehaviorReader, LoggedState, successor
 from confab.reasoner.amounts import meets
 from confab.reasoner.limits import check
 from confab.reasoner.symbols import Condition, Fact, Problem, State, Symbol
@@ -58,28 +58,28 @@ class Mark:
     """
 
     path: Path
-    child: Node
+    child: TreeNode
 
 
 @dataclass(frozen=True)
 class All:
     """A sequence node: the children are ticked one after another, until one child fails."""
 
-    children: tuple[Node, ...]
+    children: tuple[TreeNode, ...]
 
 
 @dataclass(frozen=True)
 class First:
     """A fallback node: the children are ticked one after another, until one child succeeds."""
 
-    children: tuple[Node, ...]
+    children: tuple[TreeNode, ...]
 
 
 @dataclass(frozen=True)
 class Together:
     """A parallel node: the children are ticked at the same time and must all succeed."""
 
-    children: tuple[Node, ...]
+    children: tuple[TreeNode, ...]
 
 
 @dataclass(frozen=True)
@@ -87,11 +87,11 @@ class Subtree:
     """A named subtree: the whole tree, the nodes that mark completed steps, or the sub-steps of a step."""
 
     name: str
-    child: Node
+    child: TreeNode
 
 
 Path: TypeAlias = "tuple[int, ...]"
-Node: TypeAlias = "Holds | Do | Marked | Mark | All | First | Together | Subtree"
+TreeNode: TypeAlias = "Holds | Do | Marked | Mark | All | First | Together | Subtree"
 
 
 def behavior_tree(problem: Problem, plan: Plan) -> Subtree:
@@ -104,20 +104,20 @@ def behavior_tree(problem: Problem, plan: Plan) -> Subtree:
     plan : Plan
         A plan that `confab.planner.validation.validate` accepts.
     """
-    tree = _Tree(problem, plan)
+    tree = _TreeBuilder(problem, plan)
     goal = Holds((*(Fact(symbol, value) for symbol, value in sorted(problem.goal.items())), *tree.at_rest()))
     marking = Subtree("completed steps", All(tree.marks()))
     return Subtree("plan", First((goal, All((marking, *tree.in_order(plan.steps), goal)))))
 
 
-def children(node: Node) -> tuple[Node, ...]:
+def children(node: TreeNode) -> tuple[TreeNode, ...]:
     """Return the children of a node."""
     if isinstance(node, All | First | Together):
         return node.children
     return (node.child,) if isinstance(node, Subtree | Mark) else ()
 
 
-class _Tree:
+class _TreeBuilder:
     """Creates the nodes for a plan's steps."""
 
     def __init__(self, problem: Problem, plan: Plan) -> None:
@@ -130,7 +130,7 @@ class _Tree:
             needs = dict.fromkeys(self.purposes[step.path].needs)
             for change, consumers in asked_above.get(step.path, ()):
                 needs |= {
-                    Need(Kind.LATER, (change,), by): None for by in [b for b in consumers if self.needs.get(b)][:1]
+                    Need(NeedKind.LATER, (change,), by): None for by in [b for b in consumers if self.needs.get(b)][:1]
                 }
             self.needs[step.path] = [need for need in needs if not need.by or self.needs.get(need.by)]
         self.position = {step.path: number for number, step in enumerate(primitives)}
@@ -145,12 +145,12 @@ class _Tree:
         rests = ((symbol, self.problem.domain.situations[symbol.situation].rest) for symbol in sorted(changed))
         return [Fact(symbol, rest) for symbol, rest in rests if rest is not None and symbol not in self.problem.goal]
 
-    def marks(self) -> tuple[Node, ...]:
+    def marks(self) -> tuple[TreeNode, ...]:
         """Return the nodes that mark the required primitives as done, the last primitive first."""
         needed = [path for path in self.position if self.needs[path]]
         return tuple(Mark(path, self.kept(path)) for path in reversed(needed))
 
-    def in_order(self, steps: Iterable[Step]) -> tuple[Node, ...]:
+    def in_order(self, steps: Iterable[Step]) -> tuple[TreeNode, ...]:
         """Return the nodes of sibling steps; consecutive steps that are independent are parallel."""
         groups: list[list[Step]] = []
         for step in steps:
@@ -169,7 +169,7 @@ class _Tree:
         """Return the primitives of a step that are required."""
         return [below for below in Plan((step,)).primitives if self.needs[below.path]]
 
-    def node(self, step: Step) -> Node:
+    def node(self, step: Step) -> TreeNode:
         """Return the fallback node of a step."""
         if not step.steps:
             return First((self.kept(step.path), Do(step)))
@@ -187,14 +187,14 @@ class _Tree:
 
     # ------------------------------------------------------------------------------------------------ purposes of the steps
 
-    def kept(self, path: Path) -> Node:
+    def kept(self, path: Path) -> TreeNode:
         """Return the condition that all causal links from a primitive are satisfied."""
         links = tuple(dict.fromkeys(map(self.link, self.needs[path])))
         return links[0] if len(links) == 1 else All(links)
 
-    def link(self, need: Need) -> Node:
+    def link(self, need: Need) -> TreeNode:
         """Return the condition that a causal link is satisfied: the later step is done, or the link's facts or conditions hold."""
-        kept: list[Node] = [Marked(need.by)] if need.by else []
+        kept: list[TreeNode] = [Marked(need.by)] if need.by else []
         kept.append(Holds(tuple(self.wanted(change, need.kind) for change in need.gives)))
         if need.conditions and not any(self.is_amount(change.fact.symbol) for change in need.gives):
             kept.append(Holds(conditions=need.conditions))
@@ -204,13 +204,13 @@ class _Tree:
         """Return whether the values of a symbol are numbers."""
         return self.problem.domain.situations[symbol.situation].quantity is not None
 
-    def wanted(self, change: FactChange, kind: Kind) -> Fact:
+    def wanted(self, change: FactChange, kind: NeedKind) -> Fact:
         """Return the fact that a change makes true.
 
         For an amount, the fact is a bound: the amount is at least, or at most, the planned value.
         """
         symbol, value = change.fact.symbol, change.fact.value
-        if kind is Kind.GOAL and symbol in self.problem.goal:
+        if kind is NeedKind.GOAL and symbol in self.problem.goal:
             return Fact(symbol, self.problem.goal[symbol])
         if not self.is_amount(symbol):
             return change.fact
@@ -229,7 +229,7 @@ def _abstract_links(
     found: dict[Path, list[tuple[FactChange, list[Path]]]] = {}
     for path, purpose in whole.items():
         for need in purpose.needs if under[path] != [path] else ():
-            for change in need.gives if need.kind is Kind.LATER else ():
+            for change in need.gives if need.kind is NeedKind.LATER else ():
                 writers = [one for one in under[path] if _changes(below[one], change.fact.symbol)]
                 consumers = [one for one in under[need.by] if _changes(below[one], change.fact.symbol)]
                 if writers:
@@ -254,7 +254,7 @@ class Situation:
     def __init__(self, problem: Problem, state: State) -> None:
         self.problem, self.state = problem, state
         self.rules = BehaviorReader(problem)
-        self.facts = Facts(problem, state, self.rules)
+        self.facts = LoggedState(problem, state, self.rules)
 
     def holds(self, leaf: Holds) -> bool:
         """Return whether all facts or conditions of a leaf hold."""

@@ -18,7 +18,7 @@ from fractions import Fraction
 
 from confab.planner.checked_conditions import Arguments
 from confab.planner.plan import Plan, Step
-from confab.planner.validation import BehaviorReader, Cell, Facts
+from confab.planner.validation import BehaviorReader, Cell, LoggedState
 from confab.reasoner.amounts import meets, written
 from confab.reasoner.limits import check
 from confab.reasoner.symbols import FALSE, TRUE, Condition, Fact, Problem, Symbol, ValueCondition, substituted
@@ -26,7 +26,7 @@ from confab.reasoner.symbols import FALSE, TRUE, Condition, Fact, Problem, Symbo
 Path = tuple[int, ...]
 
 
-class Kind(Enum):
+class NeedKind(Enum):
     """The kind of need for a fact."""
 
     GOAL = "goal"  # a goal
@@ -53,7 +53,7 @@ class Need:
     `conditions` lists the defined goals that follow from the facts.
     """
 
-    kind: Kind
+    kind: NeedKind
     gives: tuple[FactChange, ...]
     by: Path = ()
     conditions: tuple[Condition, ...] = ()
@@ -82,7 +82,7 @@ def purposes(problem: Problem, plan: Plan) -> dict[Path, Purpose]:
     gives: dict[Path, tuple[FactChange, ...]] = {}
     needs: dict[Path, list[Need]] = {step.path: [] for step in plan.walk()}
     for level in sorted({step.level for step in plan.walk()}):
-        course = _Course(problem, plan, level)
+        course = _LevelExecution(problem, plan, level)
         for path, need in course.links():
             if need not in needs[path]:
                 needs[path].append(need)
@@ -92,7 +92,7 @@ def purposes(problem: Problem, plan: Plan) -> dict[Path, Purpose]:
 
 def _nearest(path: Path) -> Callable[[Need], tuple[int, Path]]:
     """Return the sort key of a step's needs: the goal, steps of the same refinement, the step above, other steps, rest values."""
-    order = {Kind.GOAL: 0, Kind.ABOVE: 2, Kind.REST: 4}
+    order = {NeedKind.GOAL: 0, NeedKind.ABOVE: 2, NeedKind.REST: 4}
 
     def key(need: Need) -> tuple[int, Path]:
         beside = need.by[:-1] == path[:-1]
@@ -121,7 +121,7 @@ class _Written:
     before: str
 
 
-class _Noting(Facts):
+class _NeedRecorder(LoggedState):
     """A view of the facts that records two kinds of reads: the value of a symbol, and all symbols with a given value."""
 
     def __init__(self, problem: Problem, state: Mapping[Symbol, str]) -> None:
@@ -138,14 +138,14 @@ class _Noting(Facts):
         return list(super().holders(situation, value))
 
 
-class _Course:
+class _LevelExecution:
     """The steps of one level, executed in order."""
 
     def __init__(self, problem: Problem, plan: Plan, level: int) -> None:
         self.problem, self.level = problem, level
         self.steps = list(on_level(plan.steps, level))
         self.rules = BehaviorReader(problem)
-        self.facts = _Noting(problem, problem.initial)
+        self.facts = _NeedRecorder(problem, problem.initial)
         self.written: dict[Cell, _Written] = {}
         self.having: dict[tuple[str, str], dict[Cell, None]] = {}  # symbols that have or had a value, by value
         self.gives: dict[Path, tuple[FactChange, ...]] = {}
@@ -164,7 +164,7 @@ class _Course:
                     open_[path] = number, len(self.facts.log), self.changes(group) or {}
             for writer, changes, conditions, differs in self.needs_of(step):
                 if conditions or not differs:
-                    found.append((self.steps[writer].path, Need(Kind.LATER, changes, step.path, conditions)))
+                    found.append((self.steps[writer].path, Need(NeedKind.LATER, changes, step.path, conditions)))
                 else:
                     deeds.append((writer, number, changes, differs))
             self.done(number, step)
@@ -179,7 +179,7 @@ class _Course:
         for writer, number, changes, differs in reversed(deeds):
             step = self.steps[number]
             if any((step.path, self.fact_of(number, cell)) in needed for cell in differs):
-                found.append((self.steps[writer].path, Need(Kind.LATER, changes, step.path)))
+                found.append((self.steps[writer].path, Need(NeedKind.LATER, changes, step.path)))
                 needed |= {(self.steps[writer].path, change.fact) for change in changes}
         yield from found
 
@@ -321,11 +321,11 @@ class _Course:
             symbol, value = Symbol(*cell), str(self.facts.value(*cell))
             kind = self.problem.domain.situations[symbol.situation]
             if cell in wanted and meets(value, wanted[cell]):
-                why = Kind.ABOVE if level else Kind.GOAL
+                why = NeedKind.ABOVE if level else NeedKind.GOAL
             elif level and value == begun and self.problem.sees(level, symbol, begun):
-                why = Kind.ABOVE
+                why = NeedKind.ABOVE
             elif value == kind.rest and level < self.problem.first_level(symbol) <= self.level:
-                why = Kind.REST
+                why = NeedKind.REST
             else:
                 continue
             yield self.steps[written.by].path, Need(why, (FactChange(Fact(symbol, value), written.before),), path)
@@ -352,7 +352,7 @@ class _Course:
             if not alone and len(cells) > 1:
                 alone = [changes for changes in (self.changes_that_matter(cell, wanted, cells),) if changes]
             for changes in alone:
-                yield self.steps[writer].path, Need(Kind.GOAL, changes, (), (condition,))
+                yield self.steps[writer].path, Need(NeedKind.GOAL, changes, (), (condition,))
 
     def changes_that_matter(self, cell: Cell, wanted: str, cells: Sequence[Cell]) -> tuple[FactChange, ...]:
         """Return the changes of `cells` if a defined situation would differ without these changes.

@@ -21,7 +21,7 @@ from typing import Generic, TypeAlias, TypeVar
 
 from confab.planner.certificates import Certificate
 from confab.planner.checked_conditions import variables
-from confab.planner.possibilities import Beginning, Lowest, Range, Reading, WorkLimitError
+from confab.planner.possibilities import Beginning, FactEvaluation, Lowest, Range, WorkLimitError
 from confab.reasoner.amounts import bounds, number, written
 from confab.reasoner.symbols import FALSE, TRUE, Behavior, Fact, Problem, Symbol
 
@@ -36,7 +36,7 @@ WORK = 3_000_000
 MOST_CASES = 200_000
 
 T = TypeVar("T")
-Case: TypeAlias = "tuple[str, ...]"
+ClaimCase: TypeAlias = "tuple[str, ...]"
 Leaf: TypeAlias = "tuple[tuple[tuple[int, tuple[str, ...]], ...] | None, str]"
 """The result of a behaviour in a case: the changed entries with their possible values, and the violated claim, if any.
 
@@ -86,14 +86,14 @@ class Decisions(Generic[T]):
         self.found: T | None = None
         self.below: dict[str, Decisions[T]] = {}
 
-    def find(self, case: Case) -> T | None:
+    def find(self, case: ClaimCase) -> T | None:
         """Return the stored result for a case."""
         node: Decisions[T] | None = self
         while node is not None and node.at is not None:
             node = node.below.get(case[node.at])
         return None if node is None else node.found
 
-    def learn(self, case: Case, reads: Iterable[int], found: T) -> None:
+    def learn(self, case: ClaimCase, reads: Iterable[int], found: T) -> None:
         """Store a result under the entries on which the result depends."""
         node = self
         for at in dict.fromkeys(reads):
@@ -110,7 +110,7 @@ class CaseView:
     """
 
     claims: Claims
-    case: Case
+    case: ClaimCase
     reads: list[int] = field(default_factory=list)
     unknown: list[tuple[Symbol, str, bool]] | None = None
 
@@ -256,14 +256,14 @@ class Cases:
         self.lowest, self.problem, self.certificate = lowest, lowest.problem, certificate
         self.claims = Claims(lowest, certificate)
         self.fault = ""
-        self.reached: Case | None = None
-        self.came_from: dict[Case, tuple[Case, Try | None]] = {}
+        self.reached: ClaimCase | None = None
+        self.came_from: dict[ClaimCase, tuple[ClaimCase, Try | None]] = {}
         self._ends: Decisions[bool] = Decisions()
         self._bounds: dict[Symbol, Range] = {}
 
     # ---------------------------------------------------------------------------------------------------- beginning
 
-    def first(self) -> Case | None:
+    def first(self) -> ClaimCase | None:
         """Return the initial case, or None if some claim doesn't hold in the initial state; `fault` then names the claim."""
         lowest, certificate = self.lowest, self.certificate
         for symbol in (*certificate.always, *certificate.told_apart, *(fact.symbol for fact in certificate.never)):
@@ -328,7 +328,7 @@ class Cases:
             if len(queue) > MOST_CASES:
                 raise WorkLimitError(f"more than {MOST_CASES} cases")
 
-    def _following(self, case: Case, changes: tuple[tuple[int, tuple[str, ...]], ...]) -> Iterator[Case]:
+    def _following(self, case: ClaimCase, changes: tuple[tuple[int, tuple[str, ...]], ...]) -> Iterator[ClaimCase]:
         if not changes:
             return
         for choice in product(*(entries for _, entries in changes)):
@@ -341,7 +341,7 @@ class Cases:
 
     def tries(self) -> Iterator[Try]:
         """Yield the behaviours, with individuals, that may change a distinguished value or violate a claim."""
-        known = Reading(self.lowest, CaseView(self.claims, (ANY,) * len(self.claims.symbols)))
+        known = FactEvaluation(self.lowest, CaseView(self.claims, (ANY,) * len(self.claims.symbols)))
         seen: set[tuple[str, tuple[tuple[str, str], ...]]] = set()
         wanted: dict[str, dict[tuple[Symbol, str | None], None]] = {}
         for symbol in (*self.claims.symbols, *sorted(self.certificate.always)):
@@ -366,16 +366,16 @@ class Cases:
 
     # -------------------------------------------------------------------------------------- one behaviour in one case
 
-    def after(self, one: Try, case: Case) -> Leaf:
+    def after(self, one: Try, case: ClaimCase) -> Leaf:
         """Return the result of a behaviour in a case, from the stored results if possible."""
         known = one.known.find(case)
         if known is None:
             view = CaseView(self.claims, case)
-            known = self.effects(Reading(self.lowest, view), one)
+            known = self.effects(FactEvaluation(self.lowest, view), one)
             one.known.learn(case, view.reads, known)
         return known
 
-    def effects(self, reading: Reading, one: Try) -> Leaf:
+    def effects(self, reading: FactEvaluation, one: Try) -> Leaf:
         """Return the possible changes by a behaviour to the symbols that the certificate mentions."""
         behavior, env, claims = one.behavior, one.env, self.claims
         if not all(reading.holds(condition, env, behavior.kinds) for condition in behavior.preconditions):
@@ -428,12 +428,12 @@ class Cases:
         others = [e for e in behavior.effects if e.situation == symbol.situation and e.when and e.value != FALSE]
         return bool(last) and not others and not self.claims.broken(symbol, last[-1])
 
-    def ends_here(self, case: Case) -> bool:
+    def ends_here(self, case: ClaimCase) -> bool:
         """Return whether the goal and the rest values hold in some state of a case that violates no bound."""
         known = self._ends.find(case)
         if known is None:
             view, final = CaseView(self.claims, case), self.final(case)
-            reading, at_the_end = Reading(self.lowest, view), Reading(self.lowest, final)
+            reading, at_the_end = FactEvaluation(self.lowest, view), FactEvaluation(self.lowest, final)
             known = (
                 all(self.met(reading, fact) for fact in self.certificate.unmet)
                 and all(
@@ -444,7 +444,7 @@ class Cases:
             self._ends.learn(case, (*view.reads, *final.reads), known)
         return known
 
-    def final(self, case: Case) -> FinalView:
+    def final(self, case: ClaimCase) -> FinalView:
         """Return the view of the states of a case in which the stated goals of the certificate hold."""
         domain, goal = self.problem.domain, self.problem.goal
         goals = (fact for fact in self.certificate.unmet if fact.symbol in goal)
@@ -455,7 +455,7 @@ class Cases:
         }
         return FinalView(self.claims, case, wanted=wanted)
 
-    def excess(self, reading: Reading, symbol: Symbol) -> tuple[Range, Range] | None:
+    def excess(self, reading: FactEvaluation, symbol: Symbol) -> tuple[Range, Range] | None:
         """Return the range of a derived amount and its bounds, if the amount certainly violates the bounds; otherwise None.
 
         A plan doesn't violate the bounds. If the initial state violates the bounds, the amount may keep its initial value. A goal
@@ -464,7 +464,7 @@ class Cases:
         domain = self.problem.domain
         aggregate, quantity = domain.aggregates[symbol.situation], domain.situations[symbol.situation].quantity
         if symbol not in self._bounds:
-            first = Reading(self.lowest, Beginning(self.lowest)).total(aggregate, symbol.arguments)
+            first = FactEvaluation(self.lowest, Beginning(self.lowest)).total(aggregate, symbol.arguments)
             least = -math.inf if quantity is None or quantity.least is None else min(quantity.least, first.low)
             most = math.inf if quantity is None or quantity.most is None else max(quantity.most, first.high)
             self._bounds[symbol] = Range(least, most)
@@ -480,7 +480,7 @@ class Cases:
             found = Range(max(found.low, len(goals)), found.high)
         return (found, allowed) if found.low > allowed.high or found.high < allowed.low else None
 
-    def met(self, reading: Reading, fact: Fact) -> bool:
+    def met(self, reading: FactEvaluation, fact: Fact) -> bool:
         """Return whether a goal or rest value may hold in the final state.
 
         A symbol that isn't at rest initially may keep its value.
@@ -553,6 +553,6 @@ def unified(
     return found
 
 
-def applicable(reading: Reading, behavior: Behavior, given: Mapping[str, str]) -> Iterator[dict[str, str]]:
+def applicable(reading: FactEvaluation, behavior: Behavior, given: Mapping[str, str]) -> Iterator[dict[str, str]]:
     """Yield the bindings of a behaviour's variables that extend `given` and with which the behaviour may be applicable."""
     yield from reading.solutions(reading.lowest.asked(behavior), given, behavior.kinds)

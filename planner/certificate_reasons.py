@@ -10,7 +10,7 @@ from confab.planner.certificate_checks import Cases, CaseView, Claims, own_varia
 from confab.planner.certificates import Certificate
 from confab.planner.checked_conditions import variables
 from confab.planner.plan import Reason
-from confab.planner.possibilities import ANYTHING, Lowest, Range, Reading, WorkLimitError, compared
+from confab.planner.possibilities import ANYTHING, FactEvaluation, Lowest, Range, WorkLimitError, compared
 from confab.reasoner.amounts import MORE, Expression, bounds, terms_of, towards, written
 from confab.reasoner.sentences import an, said
 from confab.reasoner.symbols import (
@@ -116,7 +116,7 @@ def _excluded(problem: Problem, certificate: Certificate) -> tuple[str, tuple[st
         constraint = problem.domain.constraints.get(symbol.situation)
         if constraint is not None:
             return f"violate the constraint that {constraint}", (constraint.situation,)
-        excess = cases.excess(Reading(lowest, cases.final(cases.first() or ())), symbol)
+        excess = cases.excess(FactEvaluation(lowest, cases.final(cases.first() or ())), symbol)
         if excess is not None:
             found, allowed = excess
             over = found.low > allowed.high
@@ -145,10 +145,10 @@ class _Causes:
         self.lowest = Lowest(problem, WORK)
         self.claims = Claims(self.lowest, certificate)
 
-    def reading(self) -> tuple[Reading, _Noting]:
+    def reading(self) -> tuple[FactEvaluation, _ClaimRecorder]:
         """Return the reader of conditions, and the view that records the used claims."""
-        view = _Noting(self.claims, ())
-        return Reading(self.lowest, view), view
+        view = _ClaimRecorder(self.claims, ())
+        return FactEvaluation(self.lowest, view), view
 
     def chain(self) -> tuple[list[Claim], Cause]:
         """Return the shortest chain of claims from the goal to a claim whose cause depends on no other claim."""
@@ -381,7 +381,9 @@ class _Causes:
                     return Cause(f"{behavior.name} would {text}", (behavior.name, *terms))
         return Cause("")
 
-    def beyond(self, reading: Reading, env: dict[str, str], effect: Effect) -> Iterator[tuple[str, tuple[str, ...]]]:
+    def beyond(
+        self, reading: FactEvaluation, env: dict[str, str], effect: Effect
+    ) -> Iterator[tuple[str, tuple[str, ...]]]:
         """Yield as text how an effect would violate the bounds of an amount."""
         from confab.planner.possibilities import OPERATORS, calculated
 
@@ -457,7 +459,7 @@ def counted(condition: Condition | None) -> tuple[int, str, tuple[Condition, ...
 
 
 @dataclass
-class _Noting(CaseView):
+class _ClaimRecorder(CaseView):
     """A view of a case that records which claims made facts impossible."""
 
     claimed: dict[Fact, None] = field(default_factory=dict)

@@ -29,9 +29,9 @@ from typing import TypeAlias
 
 from confab.planner.certificate_checks import (
     ANY,
-    Case,
     Cases,
     CaseView,
+    ClaimCase,
     Try,
     is_bounded,
     own_variables,
@@ -40,8 +40,8 @@ from confab.planner.certificate_checks import (
 )
 from confab.planner.certificates import Certificate
 from confab.planner.checked_conditions import variables
-from confab.planner.possibilities import Lowest, NoTimeLeftError, Range, Reading, WorkLimitError
-from confab.planner.validation import BehaviorReader, Facts
+from confab.planner.possibilities import FactEvaluation, Lowest, NoTimeLeftError, Range, WorkLimitError
+from confab.planner.validation import BehaviorReader, LoggedState
 from confab.reasoner.amounts import meets, number, written
 from confab.reasoner.symbols import FALSE, TRUE, AmountEffect, Behavior, Effect, Fact, Problem, State, Symbol
 
@@ -59,7 +59,7 @@ PAIR, FEWER, SHARE = 100_000, 200_000, 0.5
 """
 FEW = 3
 """Maximum number of distinguished values of a symbol; if more are needed, all its values are distinguished."""
-Key: TypeAlias = "tuple[str, Symbol, str]"
+ReachabilityQuestion: TypeAlias = "tuple[str, Symbol, str]"
 """Kinds of questions about reachability: can a symbol get a value (`GETS`), can a symbol lose its value, or an amount
 change (`LEAVES`), can a condition on the final state hold (`ENDS`)?"""
 GETS, LEAVES, ENDS = "gets", "leaves", "ends"
@@ -173,12 +173,12 @@ class Relaxed:
 
     def __init__(self, lowest: Lowest) -> None:
         self.lowest, self.problem = lowest, lowest.problem
-        self.possible: set[Key] = set()
+        self.possible: set[ReachabilityQuestion] = set()
         self.ranges: dict[Symbol, Range] = {}
-        self.reads: dict[Key, None] = {}  # the questions asked while one question is examined
-        self._readers: dict[Key, dict[Key, None]] = {}
-        self._waiting: dict[Key, None] = {}
-        self._asking: Key | None = None
+        self.reads: dict[ReachabilityQuestion, None] = {}  # the questions asked while one question is examined
+        self._readers: dict[ReachabilityQuestion, dict[ReachabilityQuestion, None]] = {}
+        self._waiting: dict[ReachabilityQuestion, None] = {}
+        self._asking: ReachabilityQuestion | None = None
 
     # -------------------------------------------------------------------------------------------- answers known so far
 
@@ -204,7 +204,7 @@ class Relaxed:
         self._ask((LEAVES, symbol, first))
         return self.ranges.get(symbol, Range(number(first), number(first)))
 
-    def _ask(self, key: Key) -> bool:
+    def _ask(self, key: ReachabilityQuestion) -> bool:
         self.reads[key] = None
         if key not in self._readers:
             self._readers[key] = {}
@@ -215,7 +215,7 @@ class Relaxed:
 
     # -------------------------------------------------------------------------------------------- computing the answers
 
-    def reachable(self, key: Key) -> bool:
+    def reachable(self, key: ReachabilityQuestion) -> bool:
         """Answer a question about reachability: return whether the answer is yes."""
         self._asking = None
         self._ask(key)
@@ -226,15 +226,15 @@ class Relaxed:
                 self._waiting.update(self._readers[one])
         return key in self.possible
 
-    def look(self, key: Key) -> Reading:
+    def look(self, key: ReachabilityQuestion) -> FactEvaluation:
         """Return the reader of conditions for one question.
 
         `reads` records the other questions on which the answer depends.
         """
         self._asking, self.reads = key, {}
-        return Reading(self.lowest, self)
+        return FactEvaluation(self.lowest, self)
 
-    def _news(self, key: Key) -> bool:
+    def _news(self, key: ReachabilityQuestion) -> bool:
         """Examine a question again.
 
         Return whether its answer has changed to possible, or to a wider range of an amount.
@@ -248,14 +248,14 @@ class Relaxed:
         self.possible.add(key)
         return True
 
-    def brought_about(self, reading: Reading, key: Key) -> bool:
+    def brought_about(self, reading: FactEvaluation, key: ReachabilityQuestion) -> bool:
         """Return whether the answer to a question is yes according to the present knowledge."""
         kind, symbol, value = key
         if kind == ENDS:
             return reading.goal(symbol, value)
         return any(self.possible_ways(reading, symbol, value, other=kind == LEAVES))
 
-    def possible_ways(self, reading: Reading, symbol: Symbol, value: str, other: bool) -> Iterator[Try]:
+    def possible_ways(self, reading: FactEvaluation, symbol: Symbol, value: str, other: bool) -> Iterator[Try]:
         """Yield the behaviours, with individuals, that may give a symbol a value (or, with `other`, a different value)."""
         for behavior, effect in self.lowest.effects.get(symbol.situation, ()):
             words = (*symbol.arguments, None if other else value)
@@ -266,7 +266,7 @@ class Relaxed:
 
     def _envs(
         self,
-        reading: Reading,
+        reading: FactEvaluation,
         behavior: Behavior,
         effect: Effect,
         terms: tuple[str, ...],
@@ -279,7 +279,7 @@ class Relaxed:
             return
         yield from reading.solutions(self.lowest.asked(behavior, effect.when), given, behavior.kinds)
 
-    def _wider(self, reading: Reading, symbol: Symbol) -> bool:
+    def _wider(self, reading: FactEvaluation, symbol: Symbol) -> bool:
         first = number(self.lowest.initial(symbol))
         before = now = self.ranges.get(symbol, Range(first, first))
         quantity = self.lowest.quantity(symbol.situation)
@@ -313,10 +313,10 @@ class Relaxed:
                 return Certificate(frozenset(never), always, unmet=(Fact(symbol, wanted),))
         return None
 
-    def claims(self, keys: Iterable[Key]) -> tuple[set[Fact], dict[Symbol, str]]:
+    def claims(self, keys: Iterable[ReachabilityQuestion]) -> tuple[set[Fact], dict[Symbol, str]]:
         """Return all claims "never" and "always" on which the impossibility of some facts depends."""
         never, always = set[Fact](), dict[Symbol, str]()
-        seen, waiting = set[Key](), list(keys)
+        seen, waiting = set[ReachabilityQuestion](), list(keys)
         while waiting:
             key = waiting.pop()
             if key in seen or key in self.possible:
@@ -399,7 +399,7 @@ def _by_bounds(lowest: Lowest) -> Certificate | None:
         violation = domain.constraints[name].situation if name in domain.constraints else None
         for individuals in product(*(classes.get(p.kind, ()) for p in aggregate.parameters)):
             symbol, final = Symbol(name, individuals), cases.final(())
-            if is_bounded(lowest.problem, symbol) and cases.excess(Reading(lowest, final), symbol) is not None:
+            if is_bounded(lowest.problem, symbol) and cases.excess(FactEvaluation(lowest, final), symbol) is not None:
                 used = tuple(f for f in goals if f.symbol in final.used or f.symbol.situation == violation)
                 return Certificate(unmet=used or goals[:1], bounded=(symbol,))
     return None
@@ -497,7 +497,9 @@ def _enough(cases: Cases, unmet: Sequence[Fact]) -> tuple[Fact, ...]:
     """Return a few facts such that each case violates at least one of the facts."""
     failing = {
         fact: {
-            case for case in cases.came_from if not cases.met(Reading(cases.lowest, CaseView(cases.claims, case)), fact)
+            case
+            for case in cases.came_from
+            if not cases.met(FactEvaluation(cases.lowest, CaseView(cases.claims, case)), fact)
         }
         for fact in unmet
     }
@@ -509,23 +511,23 @@ def _enough(cases: Cases, unmet: Sequence[Fact]) -> tuple[Fact, ...]:
     return tuple(sorted(found))
 
 
-def _refined(cases: Cases, end: Case, relaxed: Relaxed, goal: State) -> Certificate | None:
+def _refined(cases: Cases, end: ClaimCase, relaxed: Relaxed, goal: State) -> Certificate | None:
     """Return a certificate that also distinguishes the values on which a path through the cases fails.
 
     Return None if the path succeeds.
     """
     lowest, problem = cases.lowest, cases.problem
-    path: list[tuple[Case, Try, Case]] = []
+    path: list[tuple[ClaimCase, Try, ClaimCase]] = []
     while True:
         before, one = cases.came_from[end]
         if one is None:
             break
         path.append((before, one, end))
         end = before
-    facts, rules = Facts(problem, problem.initial), BehaviorReader(problem)
+    facts, rules = LoggedState(problem, problem.initial), BehaviorReader(problem)
     for before, one, after in reversed(path):
         view = CaseView(cases.claims, before, unknown=[])
-        cases.effects(Reading(lowest, view), one)
+        cases.effects(FactEvaluation(lowest, view), one)
         arguments = tuple(one.env[p.name] for p in one.behavior.parameters)
         changes = rules.changes(one.behavior, arguments, facts)
         wrong = _wrong(view, facts)
@@ -539,7 +541,7 @@ def _refined(cases: Cases, end: Case, relaxed: Relaxed, goal: State) -> Certific
     for fact in open_ or rests:
         if fact in cases.certificate.unmet:
             view = CaseView(cases.claims, path[0][2] if path else end, unknown=[])
-            cases.met(Reading(lowest, view), fact)
+            cases.met(FactEvaluation(lowest, view), fact)
             if wrong := _wrong(view, facts):
                 return _told_apart(cases, relaxed, wrong)
     known = {symbol.situation for symbol in cases.certificate.told_apart}
@@ -549,7 +551,7 @@ def _refined(cases: Cases, end: Case, relaxed: Relaxed, goal: State) -> Certific
     return None
 
 
-def _wrong(view: CaseView, facts: Facts) -> list[tuple[Symbol, str, bool]]:
+def _wrong(view: CaseView, facts: LoggedState) -> list[tuple[Symbol, str, bool]]:
     """Return the facts that a case assumes and that don't hold in the actual state."""
     found = []
     for symbol, value, has in view.unknown or ():
@@ -559,7 +561,7 @@ def _wrong(view: CaseView, facts: Facts) -> list[tuple[Symbol, str, bool]]:
     return found
 
 
-def _is(cases: Cases, facts: Facts, case: Case, exactly: bool) -> bool:
+def _is(cases: Cases, facts: LoggedState, case: ClaimCase, exactly: bool) -> bool:
     """Return whether a state belongs to a case."""
     for at, symbol in enumerate(cases.claims.symbols):
         now = facts.value(symbol.situation, symbol.arguments) or FALSE
@@ -568,11 +570,11 @@ def _is(cases: Cases, facts: Facts, case: Case, exactly: bool) -> bool:
     return True
 
 
-def _met(problem: Problem, facts: Facts, fact: Fact) -> bool:
+def _met(problem: Problem, facts: LoggedState, fact: Fact) -> bool:
     return meets(facts.value(fact.symbol.situation, fact.symbol.arguments) or FALSE, fact.value)
 
 
-def _restless(problem: Problem, level: int, facts: Facts) -> list[Fact]:
+def _restless(problem: Problem, level: int, facts: LoggedState) -> list[Fact]:
     """Return the rest values, or initial values, that a final state must have and that the given state doesn't have."""
     found = []
     for symbol, now in sorted(facts.state().items()):

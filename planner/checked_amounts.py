@@ -11,23 +11,23 @@ from confab.reasoner.symbols import Comparison
 
 Arguments: TypeAlias = "tuple[str, ...]"
 Cell: TypeAlias = "tuple[str, Arguments]"
-Said: TypeAlias = "Callable[[str, Arguments], str | None]"
+ValueOf: TypeAlias = "Callable[[str, Arguments], str | None]"
 """Function that returns the value of a symbol, or None if the symbol doesn't exist."""
 Values: TypeAlias = "list[str]"
-Key: TypeAlias = "Callable[[Sequence[str]], Callable[[Values], Arguments]]"
+RowSelector: TypeAlias = "Callable[[Sequence[str]], Callable[[Values], Arguments]]"
 """Function that returns a selector: the selector picks the values of some terms from the values of all terms."""
-Worth: TypeAlias = "Callable[[Said, Values], Fraction | None]"
+Worth: TypeAlias = "Callable[[ValueOf, Values], Fraction | None]"
 """Function that returns the value of an amount, or None if the amount has no value."""
 Relations: TypeAlias = "Mapping[str, frozenset[Arguments]]"
 
 
-def worth(expression: Expression, key: Key, relations: Relations) -> Worth:
+def worth(expression: Expression, key: RowSelector, relations: Relations) -> Worth:
     """Return a function that calculates an arithmetic expression."""
     match expression:
         case Amount(situation, arguments):
             of = key(arguments)
 
-            def has(said: Said, values: Values) -> Fraction | None:
+            def has(said: ValueOf, values: Values) -> Fraction | None:
                 text = said(situation, of(values))
                 return None if text is None else Fraction(text)
 
@@ -39,7 +39,7 @@ def worth(expression: Expression, key: Key, relations: Relations) -> Worth:
         case Calculation(sign, one, other):
             of_left, of_right = worth(one, key, relations), worth(other, key, relations)
 
-            def result(said: Said, values: Values) -> Fraction | None:
+            def result(said: ValueOf, values: Values) -> Fraction | None:
                 left, right = of_left(said, values), of_right(said, values)
                 if left is None or right is None or (sign == "/" and not right):
                     return None
@@ -52,12 +52,12 @@ def worth(expression: Expression, key: Key, relations: Relations) -> Worth:
             return lambda said, values: number
 
 
-def compares(condition: Comparison, key: Key, relations: Relations) -> Callable[[Said, Values], bool]:
+def compares(condition: Comparison, key: RowSelector, relations: Relations) -> Callable[[ValueOf, Values], bool]:
     """Return a comparison as a test; the test is false if a value is missing."""
     of_left, of_right = worth(condition.left, key, relations), worth(condition.right, key, relations)
     holds = COMPARING[condition.operator]
 
-    def test(said: Said, values: Values) -> bool:
+    def test(said: ValueOf, values: Values) -> bool:
         left, right = of_left(said, values), of_right(said, values)
         return (left is not None and right is not None and holds(left, right)) is not condition.negated
 
@@ -65,7 +65,7 @@ def compares(condition: Comparison, key: Key, relations: Relations) -> Callable[
 
 
 def changed(
-    effects: Iterable[tuple[Cell, str, Fraction | None]], said: Said, quantities: Mapping[str, Quantity | None]
+    effects: Iterable[tuple[Cell, str, Fraction | None]], said: ValueOf, quantities: Mapping[str, Quantity | None]
 ) -> list[tuple[str, Arguments, str]] | None:
     """Return the amounts after effects, each calculated from the state before, or None if an amount is invalid.
 

@@ -28,8 +28,8 @@ Arguments: TypeAlias = "tuple[str, ...]"
 Bindings: TypeAlias = "dict[str, str]"
 Values: TypeAlias = "list[str]"
 """The individuals of terms, indexed by position."""
-Test: TypeAlias = "Callable[[Stated, Values], bool]"
-Candidates: TypeAlias = "Callable[[Stated, Values], Iterable[str]]"
+Test: TypeAlias = "Callable[[ReadableState, Values], bool]"
+Candidates: TypeAlias = "Callable[[ReadableState, Values], Iterable[str]]"
 Lookups: TypeAlias = "dict[tuple[Witness, Arguments], set[Arguments]]"
 """Lookups on which the result of a check depends.
 
@@ -38,7 +38,7 @@ lookup contains the individuals that satisfy the conditions of the witness in th
 """
 
 
-class Stated(Protocol):
+class ReadableState(Protocol):
     """The part of a state that conditions can read."""
 
     def value(self, situation: str, arguments: Arguments) -> str | None:
@@ -112,7 +112,7 @@ class ConditionReader:
         """Return a test that binds the variable of a condition to the current value, if the value belongs to a class."""
         key, place, members = self.key(condition.arguments), self.place(condition.value), self.problem.members(kind)
 
-        def given(facts: Stated, values: Values) -> bool:
+        def given(facts: ReadableState, values: Values) -> bool:
             found = facts.value(condition.situation, key(values))
             if found is None or found not in members:
                 return False
@@ -125,7 +125,7 @@ class ConditionReader:
         """Return a test that holds if the remaining tests hold with one of the candidates for a variable."""
         place, members = self.place(variable), self.problem.members(kind)
 
-        def some(facts: Stated, values: Values) -> bool:
+        def some(facts: ReadableState, values: Values) -> bool:
             for candidate in candidates(facts, values):
                 if candidate in members:
                     values[place] = candidate
@@ -147,7 +147,7 @@ class ConditionReader:
         assert self.rules.lookups is not None
         rows, key = self.rules.lookups.setdefault((Witness(variable, kind, asked), known), set()), self.key(known)
 
-        def noting(facts: Stated, values: Values) -> Iterable[str]:
+        def noting(facts: ReadableState, values: Values) -> Iterable[str]:
             rows.add(key(values))
             return candidates(facts, values)
 
@@ -162,7 +162,7 @@ class ConditionReader:
             ):
                 position, at = arguments.index(variable), self.place(value)
 
-                def having(facts: Stated, values: Values) -> Iterable[str]:
+                def having(facts: ReadableState, values: Values) -> Iterable[str]:
                     if values[at] == FALSE:  # the value false is seldom stated
                         return self.problem.classes.get(kind, ())
                     return (found[position] for found in facts.holders(situation, values[at]))
@@ -173,7 +173,7 @@ class ConditionReader:
                 known = next(i for i, a in enumerate(arguments) if a not in unknown)
                 at = self.place(arguments[known])
 
-                def related(facts: Stated, values: Values) -> Iterable[str]:
+                def related(facts: ReadableState, values: Values) -> Iterable[str]:
                     rows = self.rules.related(relation, known).get(values[at], ())
                     return dict.fromkeys([row[position] for row in rows])
 
@@ -207,7 +207,7 @@ class ConditionReader:
                 return lambda facts, values: comparison(facts.value, values)
 
 
-def all_hold(tests: Sequence[Test], facts: Stated, values: Values) -> bool:
+def all_hold(tests: Sequence[Test], facts: ReadableState, values: Values) -> bool:
     """Return whether all tests hold; store the first satisfying choices in `values`."""
     for test in tests:  # noqa: SIM110 - a generator takes twice as long
         if not test(facts, values):

@@ -10,7 +10,7 @@ from fractions import Fraction
 from typing import TypeAlias
 
 from confab.planner.checked_amounts import worth
-from confab.planner.checked_conditions import ConditionReader, Source, Stated, Values, all_hold
+from confab.planner.checked_conditions import ConditionReader, ReadableState, Source, Values, all_hold
 from confab.reasoner.amounts import written
 from confab.reasoner.derivation import strata
 from confab.reasoner.symbols import Aggregate, ClassCondition, Rule
@@ -23,7 +23,7 @@ def stratum_of(rules: Mapping[str, Sequence[Rule]]) -> dict[str, tuple[str, ...]
     return {name: group for group in strata(rules) for name in group}
 
 
-class Definitions:
+class DefinedValues:
     """Values of defined situations, computed on demand and cached until `forget` is called.
 
     Parameters
@@ -91,14 +91,14 @@ class Total:
         self._tests = reading.conjunction(asked, bound, aggregate.kinds, [self._added])
         self._terms = tuple(reading.places)
 
-    def _added(self, facts: Stated, values: Values) -> bool:
+    def _added(self, facts: ReadableState, values: Values) -> bool:
         """Add the number of one solution to the sum, and return False to request the next solution."""
         number = self._number(facts.value, values)
         if number is not None:
             self._found[self._names(values)] = number
         return False
 
-    def value(self, facts: Stated, arguments: tuple[str, ...]) -> str | None:
+    def value(self, facts: ReadableState, arguments: tuple[str, ...]) -> str | None:
         """Return the sum for some arguments as text, or None if an argument isn't of the required class."""
         if not all(a in members for a, members in zip(arguments, self._members, strict=True)):
             return None

@@ -19,7 +19,7 @@ from confab.planner.checked_conditions import Bindings
 from confab.planner.levels import failing_conditions
 from confab.planner.plan import Outcome, Plan, Reason, Step, renumbered
 from confab.planner.plan_costs import cost_of
-from confab.planner.validation import BehaviorReader, Facts, successor, validate
+from confab.planner.validation import BehaviorReader, LoggedState, successor, validate
 from confab.reasoner.amounts import Amount
 from confab.reasoner.symbols import (
     AnyOf,
@@ -103,7 +103,7 @@ def instead_of(
                 return Contrast(before, behavior.name, one.arguments, course[i])
     possible: list[tuple[int, tuple[str, ...]]] = []
     for i in places:
-        found = rules.satisfied(behavior.preconditions, given, behavior.kinds, Facts(problem, states[i]))
+        found = rules.satisfied(behavior.preconditions, given, behavior.kinds, LoggedState(problem, states[i]))
         if found is not None:
             possible += [(i, arguments) for arguments in _completed(problem, behavior, found)]
     doable = [(i, a) for i, a in possible if successor(problem, behavior, a, states[i]) is not None]
@@ -115,7 +115,7 @@ def instead_of(
     possible = doable
     if not possible:
         return _fewest_failures(
-            rules, behavior, given, [(course[i], Facts(problem, states[i])) for i in places], before
+            rules, behavior, given, [(course[i], LoggedState(problem, states[i])) for i in places], before
         )
     at, arguments = max(possible, key=lambda one: (_similarity(course[one[0]], behavior, one[1]), -one[0]))
     asked = Contrast(before, behavior.name, arguments, course[at])
@@ -161,7 +161,7 @@ def _beyond(
     rules: BehaviorReader, behavior: Behavior, arguments: tuple[str, ...], state: State
 ) -> tuple[Condition, ...]:
     """If a behaviour moves an amount beyond its bounds, return the condition that forbids this; otherwise return nothing."""
-    found = rules.beyond(behavior, arguments, Facts(rules.problem, state))
+    found = rules.beyond(behavior, arguments, LoggedState(rules.problem, state))
     if found is None:
         return ()
     symbol, old, new = found[0].symbol, Fraction(found[0].value), Fraction(found[1].value)
@@ -221,7 +221,11 @@ def _similarity(step: Step, behavior: Behavior, arguments: Sequence[str]) -> tup
 
 
 def _fewest_failures(
-    rules: BehaviorReader, behavior: Behavior, given: Bindings, places: Sequence[tuple[Step, Facts]], before: float
+    rules: BehaviorReader,
+    behavior: Behavior,
+    given: Bindings,
+    places: Sequence[tuple[Step, LoggedState]],
+    before: float,
 ) -> Contrast:
     """Return the position at which the fewest conditions of a behaviour fail, and these conditions."""
     found = []

@@ -11,7 +11,7 @@ from confab.reasoner.names import nearest
 Path: TypeAlias = "tuple[int, ...]"
 
 
-class Place(NamedTuple):
+class StepPosition(NamedTuple):
     """The place of a step in a plan: its path, its level, its ID, and texts with its words; messages show the last text."""
 
     path: Path
@@ -24,7 +24,7 @@ class UnknownStepError(LookupError):
     """Raised if no step, or more than one step, has the given number, path or words."""
 
 
-def numbers(places: Iterable[Place]) -> dict[Path, str]:
+def numbers(places: Iterable[StepPosition]) -> dict[Path, str]:
     """Return a number such as ``L2#3`` for each path: the level and the position on the level, counted from 0."""
     seen: dict[int, int] = {}
     found = {}
@@ -34,12 +34,12 @@ def numbers(places: Iterable[Place]) -> dict[Path, str]:
     return found
 
 
-def find(places: Sequence[Place], asked: int | str | Sequence[int | str], hint: str = "") -> Path:
+def find(places: Sequence[StepPosition], asked: int | str | Sequence[int | str], hint: str = "") -> Path:
     """Return the path of the step that the argument `asked` names.
 
     Parameters
     ----------
-    places : sequence of Place
+    places : sequence of StepPosition
         The places of all steps of a plan; the place of a step comes before the places of its sub-steps.
     asked : int, str or path
         The step in one of these notations: the number of a step of the first level, counted from 0, or from the end if it is

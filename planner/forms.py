@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 Path: TypeAlias = "tuple[int, ...]"
 
 
-class Node(NamedTuple):
+class StepEntry(NamedTuple):
     """A step in a plan: its position in the tree, its label, its level and its ID."""
 
     path: Path
@@ -21,7 +21,7 @@ class Node(NamedTuple):
     id: int
 
 
-def digraph(nodes: Sequence[Node]) -> networkx.DiGraph[Path]:
+def digraph(nodes: Sequence[StepEntry]) -> networkx.DiGraph[Path]:
     """Return a plan as a directed graph whose nodes are the paths of the steps.
 
     Nodes have the attributes ``label``, ``level`` and ``id``. The attribute ``kind`` of an edge is ``refines`` or ``then``.
@@ -36,7 +36,7 @@ def digraph(nodes: Sequence[Node]) -> networkx.DiGraph[Path]:
     return graph
 
 
-def edges(nodes: Sequence[Node]) -> Iterator[tuple[Path, Path, str]]:
+def edges(nodes: Sequence[StepEntry]) -> Iterator[tuple[Path, Path, str]]:
     """Yield the edges of a plan's graph, each with its kind.
 
     An edge leads from a step to a sub-step (``refines``) or to the next step (``then``).
@@ -50,7 +50,7 @@ def edges(nodes: Sequence[Node]) -> Iterator[tuple[Path, Path, str]]:
             yield path, following, "then"
 
 
-def dot(nodes: Sequence[Node]) -> str:
+def dot(nodes: Sequence[StepEntry]) -> str:
     """Return a plan as Graphviz text: sub-steps are drawn below a step, and dashed arrows lead to the next step."""
     lines = ["digraph plan {", "  node [shape=box, style=rounded];"]
     lines += [f"  {_named(node.path)} [label={_quoted(node.label)}];" for node in nodes]
@@ -67,7 +67,7 @@ def _quoted(text: str) -> str:
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
-def html(headline: str, nodes: Sequence[Node]) -> str:
+def html(headline: str, nodes: Sequence[StepEntry]) -> str:
     """Return a plan as HTML with a collapsible tree of steps."""
     above = {node.path[:-1] for node in nodes}
     parts, depth = [f"<div>{escape(headline)}"], 1

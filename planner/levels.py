@@ -16,7 +16,7 @@ from itertools import combinations
 
 from confab.planner.checked_conditions import Bindings
 from confab.planner.plan import Broken, Left, Plan, Step
-from confab.planner.validation import BehaviorReader, Cell, Facts, stretches
+from confab.planner.validation import BehaviorReader, Cell, LoggedState, stretches
 from confab.reasoner.language import is_variable, mentions
 from confab.reasoner.sentences import said
 from confab.reasoner.symbols import (
@@ -53,8 +53,8 @@ class _Watch:
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.rules = BehaviorReader(problem)
-        self.facts = Facts(problem, problem.initial)
-        self.views = {level: Facts(problem, _seen(problem, level)) for level in problem.domain.levels}
+        self.facts = LoggedState(problem, problem.initial)
+        self.views = {level: LoggedState(problem, _seen(problem, level)) for level in problem.domain.levels}
         self.left: dict[int, list[Broken]] = {}  # the violations so far, by replaced level
         self.history: dict[
             int, list[tuple[Cell, str | None]]
@@ -162,11 +162,11 @@ class _Watch:
             view.put(*cell, now)
         return possible
 
-    def mixed(self, level: int, symbol: Symbol) -> Facts:
+    def mixed(self, level: int, symbol: Symbol) -> LoggedState:
         """Return the current state, except that one symbol has the last value that the level saw."""
         values = self.facts.state()
         seen = self.views[level].value(symbol.situation, symbol.arguments)
-        return Facts(self.problem, values if seen is None else {**values, symbol: seen})
+        return LoggedState(self.problem, values if seen is None else {**values, symbol: seen})
 
     def nearest(
         self,
@@ -191,7 +191,7 @@ def failing_conditions(
     conditions: Sequence[Condition],
     terms: Bindings,
     kinds: Mapping[str, str],
-    views: Sequence[Facts],
+    views: Sequence[LoggedState],
     most: int | None = None,
 ) -> tuple[Bindings, tuple[Condition, ...]]:
     """Return the smallest set of failing conditions, and bindings with which the other conditions hold in one of the states.
@@ -208,7 +208,7 @@ def failing_conditions(
         c = conditions[number]
         return isinstance(c, ValueCondition) and not c.negated and c.value.startswith("?") and c.value not in terms
 
-    def fewest(part: Sequence[int], facts: Facts, limit: int) -> tuple[int, ...] | None:
+    def fewest(part: Sequence[int], facts: LoggedState, limit: int) -> tuple[int, ...] | None:
         """Return the smallest set of conditions in `part` whose removal makes the remaining conditions true.
 
         Return None if the set would have more than `limit` conditions.
@@ -220,7 +220,7 @@ def failing_conditions(
 
     limit = MOST_LACKING if most is None else min(most, MOST_LACKING)
     order = sorted(range(len(conditions)), key=gives)
-    found: list[tuple[tuple[int, ...], Facts]] = []
+    found: list[tuple[tuple[int, ...], LoggedState]] = []
     for facts in views:
         without: tuple[int, ...] | None = ()
         for part in _independent(conditions, order, terms):

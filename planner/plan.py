@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import networkx
     import pandas
 
-    from confab.planner.forms import Node
+    from confab.planner.forms import StepEntry
 
 
 class Status(Enum):
@@ -143,10 +143,10 @@ class Plan(Sequence[Step], metaclass=RightNames):
             No step, or more than one step, has this path or these words.
         """
         if isinstance(index, str | tuple):
-            from confab.planner.finding import Place, find
+            from confab.planner.finding import StepPosition, find
 
             steps = {step.path: step for step in self.walk()}
-            places = [Place(path, step.level, step.id, (str(step),)) for path, step in steps.items()]
+            places = [StepPosition(path, step.level, step.id, (str(step),)) for path, step in steps.items()]
             return steps[find(places, index, "walk() yields all steps")]
         if isinstance(index, int) and not -len(self.steps) <= index < len(self.steps):
             raise IndexError(f"no step {index}: the first level has {len(self.steps)}, counted from 0")
@@ -245,10 +245,10 @@ class Plan(Sequence[Step], metaclass=RightNames):
 
         return pandas.DataFrame(self.to_records())
 
-    def _nodes(self) -> list[Node]:
-        from confab.planner.forms import Node
+    def _nodes(self) -> list[StepEntry]:
+        from confab.planner.forms import StepEntry
 
-        return [Node(step.path, str(step), step.level, step.id) for step in self.walk()]
+        return [StepEntry(step.path, str(step), step.level, step.id) for step in self.walk()]
 
     def _repr_html_(self) -> str:
         from confab.planner.forms import html

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from confab.planner.plan import Plan, Step
-from confab.planner.validation import BehaviorReader, Facts
+from confab.planner.validation import BehaviorReader, LoggedState
 from confab.reasoner.symbols import Problem
 
 TRIFLE = 2.0**-20
@@ -44,7 +44,7 @@ def costs(problem: Problem, primitives: Sequence[Primitive]) -> list[float]:
     behaviors = [problem.domain.behaviors[step.behavior] for step in primitives]
     if all(behavior.price is None for behavior in behaviors):
         return [behavior.cost for behavior in behaviors]
-    found, rules, facts = [], BehaviorReader(problem), Facts(problem, problem.initial)
+    found, rules, facts = [], BehaviorReader(problem), LoggedState(problem, problem.initial)
     for step, behavior in zip(primitives, behaviors, strict=True):
         price = rules.price(behavior, step.arguments, facts)
         found.append(behavior.cost if price is None else float(price))
@@ -58,7 +58,7 @@ def in_circles(problem: Problem, plan: Plan) -> int:
 
     Only the outermost of nested circles counts. A sequence of primitives that leaves any symbol changed is no circle.
     """
-    rules, facts = BehaviorReader(problem), Facts(problem, problem.initial)
+    rules, facts = BehaviorReader(problem), LoggedState(problem, problem.initial)
     values: dict[tuple[str, tuple[str, ...]], str | None] = {}
     now, states = 0, [0]  # a state is represented by the exclusive or of the hashes of its facts
     for step in plan.primitives:

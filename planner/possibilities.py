@@ -16,7 +16,7 @@ from time import perf_counter
 from typing import Protocol, TypeAlias
 
 from confab.planner.checked_conditions import variables
-from confab.planner.checked_definitions import Definitions, stratum_of
+from confab.planner.checked_definitions import DefinedValues, stratum_of
 from confab.reasoner.amounts import (
     Amount,
     Calculation,
@@ -254,12 +254,12 @@ class Beginning:
         return Range(exactly, exactly)
 
 
-class Reading:
+class FactEvaluation:
     """Evaluation of conditions and effects of the lowest level on a fixed set of states."""
 
     def __init__(self, lowest: Lowest, knowledge: Knowledge) -> None:
         self.lowest, self.problem, self.knowledge = lowest, lowest.problem, knowledge
-        self._definitions: dict[bool, Definitions] = {}
+        self._definitions: dict[bool, DefinedValues] = {}
         self._totals: dict[tuple[str, tuple[str, ...]], Range] = {}
 
     # ------------------------------------------------------------------------------------------------------- values
@@ -281,9 +281,9 @@ class Reading:
             return self.amount_meets(symbol, value, must)
         return not self.knowledge.may_not(symbol, value) if must else self.knowledge.may(symbol, value)
 
-    def _defined(self, must: bool) -> Definitions:
+    def _defined(self, must: bool) -> DefinedValues:
         if must not in self._definitions:
-            self._definitions[must] = Definitions(self.lowest.strata, partial(self._given, must=must))
+            self._definitions[must] = DefinedValues(self.lowest.strata, partial(self._given, must=must))
         return self._definitions[must]
 
     def _given(self, situation: str, arguments: tuple[str, ...], must: bool) -> bool:

@@ -27,7 +27,7 @@ from confab.planner.validation import validate
 from confab.reasoner.limits import LimitError
 from confab.reasoner.symbols import Fact, Problem, Symbol
 
-Search: TypeAlias = "Callable[[Problem], Outcome]"
+PlanSearch: TypeAlias = "Callable[[Problem], Outcome]"
 Goals: TypeAlias = frozenset[Symbol]
 MOST_CHOICES = 200
 """Maximum number of choices for which a separate plan is searched in order to prove that no other choice is cheaper."""
@@ -36,7 +36,7 @@ PRECISION = 1_000_000
 
 
 def preferred(
-    problem: Problem, search: Search, prove: Search | None = None, finish: Search | None = None
+    problem: Problem, search: PlanSearch, prove: PlanSearch | None = None, finish: PlanSearch | None = None
 ) -> tuple[Problem, Outcome]:
     """Choose among the soft goals of a task.
 
@@ -63,7 +63,7 @@ def preferred(
     """
     if not problem.weights:
         return problem, (prove or search)(problem)
-    choices = _Choices(problem, search, prove)
+    choices = _SoftGoalChoices(problem, search, prove)
     nothing, everything = Goals(), Goals(problem.weights)
     if choices.total(nothing) is None:
         choices.least(nothing)
@@ -75,10 +75,10 @@ def preferred(
     return choices.result(*choices.cheapest(best))
 
 
-class _Choices:
+class _SoftGoalChoices:
     """The outcomes of planning for choices of soft goals, and lower bounds on the costs of their plans."""
 
-    def __init__(self, problem: Problem, search: Search, prove: Search | None) -> None:
+    def __init__(self, problem: Problem, search: PlanSearch, prove: PlanSearch | None) -> None:
         self.problem, self.search, self.prove, self.weights = problem, search, prove, problem.weights
         self.outcomes: dict[Goals, Outcome] = {}
         self.conflicts: list[tuple[frozenset[tuple[Symbol, str]], Outcome]] = []
@@ -198,7 +198,7 @@ class _Choices:
                 heapq.heappush(waiting, (unmet + self.weights[order[i]], (*dropped, i)))
 
     def result(
-        self, kept: Goals, least: Fraction | None = None, finish: Search | None = None
+        self, kept: Goals, least: Fraction | None = None, finish: PlanSearch | None = None
     ) -> tuple[Problem, Outcome]:
         """Return the task of a choice, and the outcome with the unmet soft goals and the additional cost of meeting each goal.
 

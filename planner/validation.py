@@ -23,7 +23,7 @@ from typing import TypeAlias
 
 from confab.planner.checked_amounts import changed, worth
 from confab.planner.checked_conditions import Arguments, Bindings, ConditionReader, Lookups, Values, all_hold
-from confab.planner.checked_definitions import Definitions, Total, stratum_of
+from confab.planner.checked_definitions import DefinedValues, Total, stratum_of
 from confab.planner.plan import Plan, Step
 from confab.reasoner.amounts import Quantity, meets
 from confab.reasoner.symbols import (
@@ -95,7 +95,7 @@ def carried_out(
         effect can change are also recorded in `lookups`.
     """
     rules = BehaviorReader(problem, lookups, lifted)
-    check = _Check(problem, max((step.level for step in plan.walk()), default=0), rules)
+    check = _PlanExecution(problem, max((step.level for step in plan.walk()), default=0), rules)
     if check.carried_out(plan.steps, 0, (), "the plan"):
         for fact, got in _unreached(problem, check.facts):
             check.fault((), f"the goal {fact.symbol} = {fact.value} isn't reached: it is {got} in the end")
@@ -104,10 +104,10 @@ def carried_out(
 
 def open_goals(problem: Problem) -> list[Fact]:
     """Return the goals that don't hold in the initial state; goals may be stated or derived facts."""
-    return [fact for fact, _ in _unreached(problem, Facts(problem, problem.initial))]
+    return [fact for fact, _ in _unreached(problem, LoggedState(problem, problem.initial))]
 
 
-def _unreached(problem: Problem, facts: Facts) -> Iterator[tuple[Fact, str]]:
+def _unreached(problem: Problem, facts: LoggedState) -> Iterator[tuple[Fact, str]]:
     """Yield each goal that doesn't hold, with the actual value of its symbol."""
     for symbol, wanted in problem.goal.items():
         got = facts.value(symbol.situation, symbol.arguments) or FALSE
@@ -119,13 +119,13 @@ def successor(problem: Problem, behavior: Behavior, arguments: Sequence[str], st
     """Return the state after a behaviour, or None if the behaviour isn't applicable."""
     rules = BehaviorReader(problem)
     fits = rules.fits(behavior, tuple(arguments))
-    changes = rules.changes(behavior, tuple(arguments), Facts(problem, state)) if fits else None
+    changes = rules.changes(behavior, tuple(arguments), LoggedState(problem, state)) if fits else None
     if changes is None:
         return None
     return {**state, **{Symbol(situation, key): value for situation, key, value in changes}}
 
 
-class _Check:
+class _PlanExecution:
     """The execution of a plan on symbols, with the current facts and the faults."""
 
     def __init__(self, problem: Problem, depth: int, rules: BehaviorReader) -> None:
@@ -134,7 +134,7 @@ class _Check:
         self.rests = {name: kind.rest for name, kind in problem.domain.situations.items() if kind.rest is not None}
         self.depth = depth  # the lowest level with steps in the plan
         self.rules = rules
-        self.facts = Facts(problem, problem.initial, rules)
+        self.facts = LoggedState(problem, problem.initial, rules)
         self.rules.remember(self.facts)
         self.exceptions = {name: Fraction(self.facts.value(name, ()) or 0) for name in problem.domain.constraints}
         self.faults: list[Fault] = []
@@ -314,7 +314,7 @@ def stretches(steps: Sequence[Step], level: int) -> Iterator[list[Step]]:
 # ------------------------------------------------------------------------------------------------------ states and rules
 
 
-class Facts:
+class LoggedState:
     """A state with a log of overwritten values, oldest first."""
 
     def __init__(self, problem: Problem, state: State, rules: BehaviorReader | None = None) -> None:
@@ -341,8 +341,8 @@ class Facts:
         return FALSE if value is None and self.exists(situation, arguments) else value
 
     @cached_property
-    def _definitions(self) -> Definitions:
-        return Definitions(self.rules.strata, lambda about, key: self.rules.follows(about, key, self))
+    def _definitions(self) -> DefinedValues:
+        return DefinedValues(self.rules.strata, lambda about, key: self.rules.follows(about, key, self))
 
     def state(self) -> dict[Symbol, str]:
         """Return the stated facts of the current state."""
@@ -409,25 +409,27 @@ class BehaviorReader:
         self.problem = problem
         self.lookups, self.lifted = lookups, lifted or {}
         self.strata = stratum_of(problem.domain.rules)
-        self._read: dict[str, _Behavior] = {}
+        self._read: dict[str, _CompiledBehavior] = {}
         self._rows: dict[tuple[str, int], dict[str, list[Arguments]]] = {}
-        self._defined: dict[str, list[_Behavior]] = {}
+        self._defined: dict[str, list[_CompiledBehavior]] = {}
         self.totals = {name: Total(self, one) for name, one in problem.domain.aggregates.items() if one.kept}
         self.bounded = [
             name for name in self.totals if problem.domain.situations[name].quantity not in (None, Quantity())
         ]
 
-    def follows(self, situation: str, arguments: Arguments, facts: Facts) -> bool:
+    def follows(self, situation: str, arguments: Arguments, facts: LoggedState) -> bool:
         """Return whether some rule of a situation type derives the situation with the given arguments."""
         if situation not in self._defined:
-            self._defined[situation] = [_Behavior(self, rule.behavior) for rule in self.problem.domain.rules[situation]]
+            self._defined[situation] = [
+                _CompiledBehavior(self, rule.behavior) for rule in self.problem.domain.rules[situation]
+            ]
         for rule in self._defined[situation]:
             values = [*arguments, *rule.terms[len(arguments) :]]
             if all(map(contains, rule.members, arguments)) and all_hold(rule.preconditions, facts, values):
                 return True
         return False
 
-    def remember(self, facts: Facts, level: int | None = None) -> None:
+    def remember(self, facts: LoggedState, level: int | None = None) -> None:
         """Make each remembered symbol true if the symbol that it keeps in memory is true.
 
         If `level` is given, only the remembered symbols that the level sees are changed.
@@ -440,10 +442,10 @@ class BehaviorReader:
                 if facts.value(name, arguments) != TRUE and facts.value(source, arguments) == TRUE:
                     facts.put(name, arguments, TRUE)
 
-    def read(self, behavior: Behavior) -> _Behavior:
+    def read(self, behavior: Behavior) -> _CompiledBehavior:
         """Return a behaviour in its compiled form."""
         if behavior.name not in self._read:
-            self._read[behavior.name] = _Behavior(self, behavior)
+            self._read[behavior.name] = _CompiledBehavior(self, behavior)
         return self._read[behavior.name]
 
     def fits(self, behavior: Behavior, arguments: Arguments) -> bool:
@@ -451,7 +453,7 @@ class BehaviorReader:
         members = self.read(behavior).members
         return len(arguments) == len(members) and all(map(contains, members, arguments))
 
-    def changes(self, behavior: Behavior, arguments: Arguments, facts: Facts) -> list[NewValue] | None:
+    def changes(self, behavior: Behavior, arguments: Arguments, facts: LoggedState) -> list[NewValue] | None:
         """Return the values that a behaviour gives to symbols, in order, or None if the behaviour isn't applicable.
 
         The arguments must belong to the classes of the parameters.
@@ -478,7 +480,7 @@ class BehaviorReader:
         more = changed(read.on_amounts(values, facts), facts.value, quantities)
         return None if more is None else found + more
 
-    def beyond(self, behavior: Behavior, arguments: Arguments, facts: Facts) -> tuple[Fact, Fact] | None:
+    def beyond(self, behavior: Behavior, arguments: Arguments, facts: LoggedState) -> tuple[Fact, Fact] | None:
         """Return the first amount that a behaviour would make invalid: the amount before and after the behaviour.
 
         Return None if every new amount is allowed, or if the behaviour isn't applicable.
@@ -494,14 +496,14 @@ class BehaviorReader:
                 return Fact(Symbol(situation, key), before), Fact(Symbol(situation, key), value)
         return None
 
-    def price(self, behavior: Behavior, arguments: Arguments, facts: Facts) -> Fraction | None:
+    def price(self, behavior: Behavior, arguments: Arguments, facts: LoggedState) -> Fraction | None:
         """Return the price of a behaviour in the current state, or None if the behaviour has no price or isn't applicable."""
         read = self.read(behavior)
         values = [*arguments, *read.terms[len(arguments) :]]
         return read.price(facts.value, values) if read.price and all_hold(read.preconditions, facts, values) else None
 
     def satisfied(
-        self, conditions: Sequence[Condition], terms: Bindings, kinds: Mapping[str, str], facts: Facts
+        self, conditions: Sequence[Condition], terms: Bindings, kinds: Mapping[str, str], facts: LoggedState
     ) -> Bindings | None:
         """Return bindings of the variables with which all conditions hold, or None if there are no such bindings.
 
@@ -524,7 +526,7 @@ class BehaviorReader:
         return self._rows[relation, position]
 
 
-class _Behavior:
+class _CompiledBehavior:
     """A behaviour in compiled form: positions of terms, preconditions, and effects with their conditions."""
 
     def __init__(self, rules: BehaviorReader, behavior: Behavior) -> None:
@@ -568,7 +570,7 @@ class _Behavior:
         self.terms = tuple(reading.places)
         self.members = [rules.problem.members(p.kind) for p in behavior.parameters]
 
-    def on_amounts(self, values: Values, facts: Facts) -> Iterator[tuple[Cell, str, Fraction | None]]:
+    def on_amounts(self, values: Values, facts: LoggedState) -> Iterator[tuple[Cell, str, Fraction | None]]:
         """Yield the symbols whose amounts change, each with the operation and the operand."""
         for when, situation, key, operation, amount in self.amounts:
             inner = values.copy()

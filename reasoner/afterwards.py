@@ -37,11 +37,11 @@ from confab.reasoner.symbols import (
     substituted,
 )
 
-Formula: TypeAlias = "Condition | bool"
+Simplified: TypeAlias = "Condition | bool"
 Conjunction: TypeAlias = "tuple[Condition, ...] | None"
 """A conjunction of conditions; None stands for a contradictory conjunction."""
 Scaled: TypeAlias = "Callable[[Expression], Expression]"
-Term: TypeAlias = "tuple[Amount, str, Scaled]"
+ScaledAmount: TypeAlias = "tuple[Amount, str, Scaled]"
 OPPOSITE: Mapping[str, str] = {"increase": "decrease", "decrease": "increase"}
 MOST_CASES = 24
 """Maximum number of combinations of effects that may change one expression."""
@@ -51,7 +51,7 @@ class TooManyCasesError(ValueError):
     """Raised if more than `MOST_CASES` combinations of effects may change one expression."""
 
 
-def both(formulas: Iterable[Formula]) -> Conjunction:
+def both(formulas: Iterable[Simplified]) -> Conjunction:
     """Return the conjunction of formulas without conjuncts that are always true; return None for a contradiction."""
     found: dict[Condition, None] = {}
     for formula in formulas:
@@ -64,7 +64,7 @@ def both(formulas: Iterable[Formula]) -> Conjunction:
     return tuple(found)
 
 
-def either(alternatives: Iterable[Conjunction]) -> Formula:
+def either(alternatives: Iterable[Conjunction]) -> Simplified:
     """Return the disjunction of conjunctions."""
     left = [group for group in dict.fromkeys(alternatives) if group is not None]
     if not left:
@@ -79,7 +79,7 @@ def opposite(formula: Condition) -> Condition:
     return replace(formula, negated=not formula.negated)
 
 
-def negation(formula: Formula | Conjunction) -> Formula:
+def negation(formula: Simplified | Conjunction) -> Simplified:
     """Return the negation of a formula or conjunction."""
     if formula is None or isinstance(formula, bool):
         return not formula
@@ -200,7 +200,7 @@ class Afterwards:
         """Return the individuals of a class."""
         return {*self.classes.get(kind, ())}
 
-    def among(self, term: str, kind: str) -> Formula:
+    def among(self, term: str, kind: str) -> Simplified:
         """Return the condition that a term denotes a member of a class."""
         members = self.members(kind)
         if not is_variable(term):
@@ -210,7 +210,7 @@ class Afterwards:
             return True
         return ClassCondition(term, kind) if own & members else False
 
-    def equal(self, one: str, other: str) -> Formula:
+    def equal(self, one: str, other: str) -> Simplified:
         """Return the condition that two terms denote the same individual."""
         if one == other:
             return True
@@ -219,14 +219,14 @@ class Afterwards:
             return False
         return EqualityCondition(one, other)
 
-    def before(self, condition: Condition) -> Formula:
+    def before(self, condition: Condition) -> Simplified:
         """Return a condition on the state before the behaviour, simplified by means of the preconditions."""
         if isinstance(condition, ValueCondition):
             found = self.value(condition.situation, condition.arguments, condition.value)
             return negation(found) if condition.negated else found
         return condition
 
-    def value(self, situation: str, arguments: tuple[str, ...], value: str) -> Formula:
+    def value(self, situation: str, arguments: tuple[str, ...], value: str) -> Simplified:
         """Return the condition that a symbol has a value before the behaviour."""
         known = self._known.get((situation, arguments))
         return ValueCondition(situation, arguments, value) if known is None else self.equal(known, value)
@@ -257,7 +257,7 @@ class Afterwards:
         """Return whether the behaviour changes a situation type in a condition."""
         return any(situations_of(inner) & self.behavior.changes for inner in walk(condition))
 
-    def condition(self, condition: Condition) -> Formula:
+    def condition(self, condition: Condition) -> Simplified:
         """Translate a condition on the state after the behaviour to an equivalent condition on the state before the behaviour.
 
         All variables of the condition must be bound, by other conditions or by its own witnesses.
@@ -266,7 +266,7 @@ class Afterwards:
             return condition
         match condition:
             case ValueCondition(situation, arguments, value, negated):
-                found: Formula = self.value(situation, arguments, value)
+                found: Simplified = self.value(situation, arguments, value)
                 for effect in (e for e in self.behavior.effects if e.situation == situation):
                     found = self._overwritten(effect, arguments, value, found)
             case Comparison(left, sign, right, negated):
@@ -285,7 +285,9 @@ class Afterwards:
                 return condition
         return negation(found) if negated else found
 
-    def _overwritten(self, effect: ValueEffect, arguments: tuple[str, ...], value: str, before: Formula) -> Formula:
+    def _overwritten(
+        self, effect: ValueEffect, arguments: tuple[str, ...], value: str, before: Simplified
+    ) -> Simplified:
         """Return the condition that a symbol has a value after an effect; `before` is this condition without the effect."""
         apart = self.apart(effect)
         assert isinstance(apart, ValueEffect)
@@ -301,7 +303,7 @@ class Afterwards:
 
     def linear(
         self, expression: Expression, operation: str = "increase", scaled: Scaled = lambda by: by
-    ) -> list[Term] | None:
+    ) -> list[ScaledAmount] | None:
         """Return the changing amounts in a linear expression, if effects only increase or decrease these amounts.
 
         Parameters
@@ -317,7 +319,7 @@ class Afterwards:
         list of (Amount, str, callable) or None
             For each changing amount: the amount, its `operation` and its `scaled`. None if the expression isn't linear.
         """
-        found: list[list[Term] | None]
+        found: list[list[ScaledAmount] | None]
         match expression:
             case Amount(situation, _):
                 operations = {effect.operation for effect in self.amounts if effect.situation == situation}

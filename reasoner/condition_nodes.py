@@ -48,7 +48,7 @@ from confab.reasoner.symbols import (
 from confab.reasoner.vocabulary import ARGUMENTS, CORE, TYPE, XSD
 
 T = TypeVar("T")
-Node: TypeAlias = "Mapping[str, Sequence[str]]"
+NodeValues: TypeAlias = "Mapping[str, Sequence[str]]"
 """The values of a node by the IRI of the property; values are IRIs or the text of literals."""
 Properties: TypeAlias = "dict[str, list[str]]"
 """The values of a node by the name of the property in the core."""
@@ -310,7 +310,7 @@ class NodeReader:
     """
 
     error: ClassVar[type[ValueError]] = ValueError
-    nodes: Mapping[str, Node]
+    nodes: Mapping[str, NodeValues]
     inside: list[str]
     count: list[int]
 

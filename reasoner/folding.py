@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
-from confab.reasoner.afterwards import Conjunction, Formula, either, negation, opposite
+from confab.reasoner.afterwards import Conjunction, Simplified, either, negation, opposite
 from confab.reasoner.amounts import COMPARING, Calculation, Expression
 from confab.reasoner.language import groups, is_variable
 from confab.reasoner.symbols import (
@@ -65,7 +65,7 @@ class Folding:
                 more = more or (bool(groups(part)) and any(not groups(one) for one in _parts((folded,))))
         return self.conjunction(found) if more else tuple(found)
 
-    def condition(self, condition: Condition) -> Formula:
+    def condition(self, condition: Condition) -> Simplified:
         """Return a simplified condition, or a truth value if the condition doesn't depend on the state."""
         if condition in self.known:
             return True

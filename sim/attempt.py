@@ -11,7 +11,7 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from confab.sim.collision import Mover, Surroundings, free
+from confab.sim.collision import Mover, Obstacles, free
 from confab.sim.engine import Engine
 from confab.sim.motion import (
     SWIVELS,
@@ -378,7 +378,7 @@ def _position_in(world: Engine, carrier: str, body: str) -> Array:
     return local
 
 
-Scene = tuple[Mover, Surroundings, float]
+Scene = tuple[Mover, Obstacles, float]
 """The moving spheres of the arm at a stage, the obstacles, and the margin in metres."""
 
 

@@ -59,7 +59,7 @@ class Solid:
 
 
 @dataclass(frozen=True)
-class Surroundings:
+class Obstacles:
     """The obstacles of an arm: solids, and the spheres of the robot's body and of other arms with the names of their owners."""
 
     solids: tuple[Solid, ...] = ()
@@ -67,7 +67,7 @@ class Surroundings:
     radii: Array = field(default_factory=lambda: np.zeros(0))
     owners: tuple[str, ...] = ()
 
-    def without(self, *names: str) -> Surroundings:
+    def without(self, *names: str) -> Obstacles:
         """Return the surroundings without the solids, parts and sphere owners of the given names."""
         left = replace(self, solids=tuple(s for s in self.solids if s.name not in names and s.part not in names))
         if names and (gone := {*names} & {*self.owners}):
@@ -94,7 +94,7 @@ class Surroundings:
         """Number of boxes among the solids."""
         return sum(solid.kind != "cylinder" for solid in self.solids)
 
-    def plus(self, owner: str, spheres: Spheres) -> Surroundings:
+    def plus(self, owner: str, spheres: Spheres) -> Obstacles:
         """Return the surroundings with the spheres of `owner` added."""
         return replace(
             self,
@@ -128,12 +128,12 @@ class Mover:
             self.arm, together, np.concatenate([self.carrier, np.full(len(spheres.radii), len(self.arm.joints) - 1)])
         )
 
-    def clearances(self, q: Array, around: Surroundings) -> dict[str, Array]:
+    def clearances(self, q: Array, around: Obstacles) -> dict[str, Array]:
         """Return the distance (n,) of each nearby obstacle from the arm at each posture."""
         return clearances(self.at(q), self.spheres.radii, around)
 
 
-def free(centers: Array, radii: Array, around: Surroundings, margin: float) -> Flags:
+def free(centers: Array, radii: Array, around: Obstacles, margin: float) -> Flags:
     """Return for each of n postures whether spheres of `radii` (m,) at `centers` (n, m, 3) keep the margin.
 
     The function `free` is faster than `clearances`.
@@ -144,7 +144,7 @@ def free(centers: Array, radii: Array, around: Surroundings, margin: float) -> F
     )
 
 
-def _free(centers: Array, radii: Array, around: Surroundings, margin: float) -> Flags:
+def _free(centers: Array, radii: Array, around: Obstacles, margin: float) -> Flags:
     keep, found = np.maximum(radii + margin, 0.0), np.ones(len(centers), dtype=bool)
     if not centers.size:
         return found
@@ -186,7 +186,7 @@ def _meeting(low: Array, high: Array, bottom: Array, top: Array) -> tuple[NDArra
     return np.flatnonzero(near.any(1)), np.flatnonzero(near.any(0))
 
 
-def clearances(centers: Array, radii: Array, around: Surroundings) -> dict[str, Array]:
+def clearances(centers: Array, radii: Array, around: Obstacles) -> dict[str, Array]:
     """Return the distance (n,) of each nearby obstacle from spheres (m,) at centres (n, m, 3)."""
     low, high = (centers - radii[:, None]).min((0, 1)) - 0.05, (centers + radii[:, None]).max((0, 1)) + 0.05
     found: dict[str, Array] = {}

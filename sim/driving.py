@@ -15,7 +15,7 @@ import numpy as np
 from confab.sim.arms import Flags, read_arm
 from confab.sim.assembly import read_robot
 from confab.sim.base import Base
-from confab.sim.collision import Surroundings, clearances, fixed_spheres, free
+from confab.sim.collision import Obstacles, clearances, fixed_spheres, free
 from confab.sim.engine import Engine
 from confab.sim.motion import Blocked, connect, line, polyline, scheduled, turned_near
 from confab.sim.urdf import Array, Spheres
@@ -49,7 +49,7 @@ class Roller:
 
     centers: Array
     radii: Array
-    around: Surroundings
+    around: Obstacles
     margin: float
 
     @property

@@ -21,7 +21,7 @@ from confab.reasoner.embodiment.values import Embodiment, Shape
 from confab.reasoner.limits import check
 from confab.sim.base import Base
 from confab.sim.bodies import center_height, height_of, inner_radius, outer_radius, outline, pieces, vessel_height
-from confab.sim.collision import Solid, Surroundings, box, clearances, column, rim
+from confab.sim.collision import Obstacles, Solid, box, clearances, column, rim
 from confab.sim.mechanisms import Mechanic
 from confab.sim.robot import Manipulator
 from confab.sim.sight import Sight, Sought, look, over_the_shoulders
@@ -62,7 +62,7 @@ def whole_spheres(shape: Shape) -> Spheres:
 
 
 @dataclass(frozen=True)
-class Thing:
+class SimulatedBody:
     """A body in the world: its PyBullet number and its shape after perturbation."""
 
     body: int
@@ -108,7 +108,7 @@ class Engine:
         self.disturb: Callable[[Engine], None] | None = None
         self.steps, self.current, self.clock = 0, -1, Clock()
         self.names: dict[int, str] = {}
-        self.bodies: dict[str, Thing] = {}
+        self.bodies: dict[str, SimulatedBody] = {}
         self.hands: dict[str, Manipulator] = {}
         self.bases: dict[str, Base] = {}
         self.standing: dict[str, Spheres] = {}
@@ -484,9 +484,7 @@ class Engine:
 
     # ------------------------------------------------------------------------------------------------- surroundings
 
-    def surroundings(
-        self, mover: str, held: str | None = None, values: Mapping[str, float] | None = None
-    ) -> Surroundings:
+    def surroundings(self, mover: str, held: str | None = None, values: Mapping[str, float] | None = None) -> Obstacles:
         """Return the obstacles of a hand: furniture, perceived bodies, the robots' trunks and the other arms.
 
         The `held` body and the bodies that stand on it are left out. `values` replaces the joint values of some links.
@@ -500,7 +498,7 @@ class Engine:
                 rotation, base = self.taken_along(name, values) if values else self.sense(name)
                 for kind, half, middle, turned in pieces(thing.shape, name in self.containers):
                     solids.append(Solid(name, kind, np.array(half), base + rotation @ middle, rotation @ turned))
-        around = Surroundings(tuple(solids))
+        around = Obstacles(tuple(solids))
         for name, spheres in self.standing.items():
             around = around.plus(name, spheres)
         for name, other in self.hands.items():

@@ -30,7 +30,7 @@ import pybullet
 
 from confab.reasoner.embodiment.values import Shape
 from confab.sim.bodies import KINDS, center_height
-from confab.sim.engine import Engine, Thing
+from confab.sim.engine import Engine, SimulatedBody
 from confab.sim.kinematics import inverse
 from confab.sim.motion import SWIVELS, poses_at, rotations
 from confab.sim.urdf import Array
@@ -121,7 +121,7 @@ def stranger(
     numbers = dict(zip(("width", "depth", "height"), size, strict=True))
     shape = Shape("box", mass=1.0, grasp_height=size[2] / 2, numbers=numbers)
     body = KINDS["box"].make(world.client, shape, np.array(point), np.array(UPRIGHT))
-    world.bodies["stranger"], world.names[body] = Thing(body, shape), "stranger"
+    world.bodies["stranger"], world.names[body] = SimulatedBody(body, shape), "stranger"
 
 
 # ------------------------------------------------------------------------------------------------- objects

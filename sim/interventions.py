@@ -11,7 +11,7 @@ from confab.planner.acting.episode import InterventionKind
 from confab.reasoner.embodiment.values import PerceiverUse, Shape
 from confab.reasoner.symbols import Symbol
 from confab.sim.bodies import KINDS, center_height, outer_radius
-from confab.sim.engine import Thing
+from confab.sim.engine import SimulatedBody
 from confab.sim.staging import pour_in
 from confab.sim.urdf import Array
 from confab.sim.world import PhysicsWorld
@@ -69,7 +69,7 @@ def put_box(world: PhysicsWorld, name: str, place: str, size: Sequence[float]) -
     numbers = dict(zip(("width", "depth", "height"), size, strict=True))
     shape = Shape("box", 0.2, size[2] / 2, numbers=numbers, color=(0.8, 0.6, 0.4, 1.0))
     body = KINDS["box"].make(world.client, shape, world.place(place), np.array(UPRIGHT))
-    world.names[body], world.bodies[name] = name, Thing(body, shape)
+    world.names[body], world.bodies[name] = name, SimulatedBody(body, shape)
 
 
 def fill(world: PhysicsWorld, use: PerceiverUse, symbol: Symbol, value: str) -> None:

@@ -22,7 +22,7 @@ from confab.reasoner.embodiment.values import Body
 from confab.reasoner.possible import refuse_impossible
 from confab.reasoner.symbols import Fact, Problem, State
 from confab.sim.bodies import KINDS
-from confab.sim.engine import Engine, Thing
+from confab.sim.engine import Engine, SimulatedBody
 from confab.sim.interventions import DISTURBERS, HANDLED, move, put_box
 from confab.sim.lookout import Lookout
 from confab.sim.perception import tilt_of
@@ -235,7 +235,7 @@ class LiveWorld:
         world.embodiment = replace(world.embodiment, bodies=bodies)
         somewhere, upright = np.array([0.0, 0.0, -5.0]), np.array([0.0, 0.0, 0.0, 1.0])
         body = KINDS[model.shape.kind].make(world.client, model.shape, somewhere, upright)
-        world.names[body], world.bodies[name] = name, Thing(body, model.shape)
+        world.names[body], world.bodies[name] = name, SimulatedBody(body, model.shape)
         world.symbols = [*world.symbols, *(fact.symbol for fact in intervention.facts)]
         for fact in intervention.facts:
             self._make_true(fact)

@@ -18,7 +18,7 @@ from typing import Protocol
 import numpy as np
 
 from confab.sim.arms import Arm, Flags, hand_frames, turn
-from confab.sim.collision import Mover, Surroundings, free
+from confab.sim.collision import Mover, Obstacles, free
 from confab.sim.kinematics import inverse, swivel_of
 from confab.sim.urdf import Array
 
@@ -85,7 +85,7 @@ class Reacher:
     """
 
     mover: Mover
-    around: Surroundings
+    around: Obstacles
     margin: float = 0.008
     joint_margin: float = 0.03
     fold: float = 0.0

@@ -36,7 +36,7 @@ from confab.sim.features import Ways, ways
 from confab.sim.measuring import check, finger_force, until
 from confab.sim.motion import pose_of, rotations, turned_near
 from confab.sim.pouring import FOLD, reach_over
-from confab.sim.running import Run
+from confab.sim.running import SkillRun
 from confab.sim.stages import Stage, rises
 from confab.sim.swings import SAMPLES, check_swing
 from confab.sim.touch import FINGERS, ROOM, draw_back, go_around, off_centre, room
@@ -81,7 +81,7 @@ def carry_out(world: Engine, use: SkillUse, roles: Mapping[str, str]) -> Mapping
         )
     world.look()
     hands = {"hand": world.acting(roles)} | {phase.by: roles[phase.by] for phase in use.phases if phase.by != "hand"}
-    runs = {role: Run(Attempt.begin(world, hand), roles, use.numbers) for role, hand in hands.items()}
+    runs = {role: SkillRun(Attempt.begin(world, hand), roles, use.numbers) for role, hand in hands.items()}
     phases = [phase for phase in use.phases if all(CONDITIONS[word](runs[phase.by]) for word in phase.when)]
     with ExitStack() as stack:
         for hand in hands.values():
@@ -94,14 +94,14 @@ def carry_out(world: Engine, use: SkillUse, roles: Mapping[str, str]) -> Mapping
     return {name: value for run in runs.values() for name, value in run.measured.items()}
 
 
-def _handled(run: Run, phases: Iterable[Phase]) -> tuple[str, ...]:
+def _handled(run: SkillRun, phases: Iterable[Phase]) -> tuple[str, ...]:
     """Return the bodies that a skill may have moved: the object if fingers moved, and all held bodies if the robot drove."""
     carried = [run.world.held(hand) for hand in run.world.hands] if "robot" in run.roles else []
     taken = [run.roles["object"] for phase in phases if phase.fingers and "object" in run.roles]
     return tuple(name for name in (*taken, *carried) if name)
 
 
-def _carry_out(run: Run, phase: Phase, later: Sequence[Phase]) -> None:
+def _carry_out(run: SkillRun, phase: Phase, later: Sequence[Phase]) -> None:
     if phase.motion == "free":
         _with_looks(run, phase, lambda: _lower(run, (phase, *later), lambda: _free(run, phase, later)))
     else:
@@ -114,7 +114,7 @@ def _carry_out(run: Run, phase: Phase, later: Sequence[Phase]) -> None:
         check(run, phase, guard)
 
 
-def _lower(run: Run, phases: Iterable[Phase], motion: Callable[[], None]) -> None:
+def _lower(run: SkillRun, phases: Iterable[Phase], motion: Callable[[], None]) -> None:
     """Execute a motion; if a lifting motion is blocked, try lower heights in turn.
 
     The error names the bodies that block the motion at any of the heights, and has the message of the lowest height.
@@ -138,7 +138,7 @@ def _lower(run: Run, phases: Iterable[Phase], motion: Callable[[], None]) -> Non
             return
 
 
-def _with_looks(run: Run, phase: Phase, motion: Callable[[], None]) -> None:
+def _with_looks(run: SkillRun, phase: Phase, motion: Callable[[], None]) -> None:
     """Execute a motion; with noisy perception, look again and repeat a motion that a known body blocked or stopped."""
     world, hand = run.world, run.attempt.hand
     for looks in range(1, LOOKS + 1):
@@ -159,7 +159,7 @@ def _with_looks(run: Run, phase: Phase, motion: Callable[[], None]) -> None:
 # ----------------------------------------------------------------------------------------------------- poses
 
 
-def _offset(run: Run, phase: Phase, turned: Array) -> Array:
+def _offset(run: SkillRun, phase: Phase, turned: Array) -> Array:
     """Return the offset of a phase as vectors (n, 3), for hands with rotations `turned` (n, 3, 3)."""
     local = np.array([run.number(part) for part in phase.offset])
     if phase.bring == "base":
@@ -172,7 +172,7 @@ def _offset(run: Run, phase: Phase, turned: Array) -> Array:
     return shift
 
 
-def _poses(run: Run, phase: Phase, previous: Array, way: Ways | None) -> Array:
+def _poses(run: SkillRun, phase: Phase, previous: Array, way: Ways | None) -> Array:
     """Return the goal poses (n, 6) of a phase for hands at poses `previous` (n, 6); `way` has the hands' grasps, if given."""
     poses = previous.copy()
     if phase.to == "hand":
@@ -191,7 +191,7 @@ def _poses(run: Run, phase: Phase, previous: Array, way: Ways | None) -> Array:
     return poses
 
 
-def _moved(run: Run, phase: Phase, hand: Array, way: Ways, values: Sequence[float]) -> list[Array]:
+def _moved(run: SkillRun, phase: Phase, hand: Array, way: Ways, values: Sequence[float]) -> list[Array]:
     """Return, for each joint value, the poses (n, 6) of hands that hold a feature while the feature's joint moves to this value.
 
     The hand keeps its pose in the feature's frame, except that the hand may turn about the feature's z axis.
@@ -221,7 +221,7 @@ def _moved(run: Run, phase: Phase, hand: Array, way: Ways, values: Sequence[floa
 # ----------------------------------------------------------------------------------------------------- motions
 
 
-def _choose(run: Run, phase: Phase, later: Sequence[Phase]) -> tuple[Array, Ways, list[int]]:
+def _choose(run: SkillRun, phase: Phase, later: Sequence[Phase]) -> tuple[Array, Ways, list[int]]:
     """Return candidate goal poses of a free motion, their grasps, and the indices of candidates that allow all later phases."""
     chain = [phase]
     for one in later:
@@ -261,7 +261,7 @@ def _choose(run: Run, phase: Phase, later: Sequence[Phase]) -> tuple[Array, Ways
     return stages[0].poses, way, _allowed(run, chain, stages, way.cost)
 
 
-def _allowed(run: Run, chain: Sequence[Phase], stages: Sequence[Stage], cost: Array | None) -> list[int]:
+def _allowed(run: SkillRun, chain: Sequence[Phase], stages: Sequence[Stage], cost: Array | None) -> list[int]:
     """Return the candidates that allow all stages, with room for corrections if possible, or with narrower fingers if needed."""
     narrow = any(one.motion == "yielding" and room(run, one.to) < ROOM for one in chain)
     if narrow or run.world.blur:
@@ -277,7 +277,7 @@ def _allowed(run: Run, chain: Sequence[Phase], stages: Sequence[Stage], cost: Ar
     return run.attempt.choose(stages, run.things(), run.spread, cost)
 
 
-def _swing(run: Run, phase: Phase, poses: Array, way: Ways, ignored: tuple[str, ...]) -> list[Stage]:
+def _swing(run: SkillRun, phase: Phase, poses: Array, way: Ways, ignored: tuple[str, ...]) -> list[Stage]:
     """Return one stage for each of several values on a joint's path; raise `SkillError` if a body blocks the link."""
     mechanic, link = run.joint(phase.to)
     values = np.linspace(mechanic.values()[link], run.number(phase.value, link), SAMPLES)
@@ -291,7 +291,7 @@ def _swing(run: Run, phase: Phase, poses: Array, way: Ways, ignored: tuple[str, 
     ]
 
 
-def _free(run: Run, phase: Phase, later: Sequence[Phase]) -> None:
+def _free(run: SkillRun, phase: Phase, later: Sequence[Phase]) -> None:
     """Move to one of the poses that allow all later phases."""
     goals, way, chosen = _choose(run, phase, later)  # a failure happens before the fingers move
     FINGERS[phase.fingers](run, phase)
@@ -303,7 +303,7 @@ def _free(run: Run, phase: Phase, later: Sequence[Phase]) -> None:
     run.arrived(goals[best])
 
 
-def _line(run: Run, phase: Phase) -> None:
+def _line(run: SkillRun, phase: Phase) -> None:
     hand = run.attempt.hand
     goal = turned_near(hand.pose, _poses(run, phase, hand.pose[None], run.way)[0])
     stop = until(run, phase)
@@ -316,12 +316,12 @@ def _line(run: Run, phase: Phase) -> None:
         run.arrived(goal)
 
 
-def _yielding(run: Run, phase: Phase) -> None:
+def _yielding(run: SkillRun, phase: Phase) -> None:
     now = run.attempt.hand.pose
     go_around(run, phase, run.feature_of(phase.to)[0], turned_near(now, _poses(run, phase, now[None], run.way)[0]))
 
 
-def _joint(run: Run, phase: Phase) -> None:
+def _joint(run: SkillRun, phase: Phase) -> None:
     """Move a joint along its path in stretches; each stretch is planned from the present positions of hand and joint."""
     mechanic, link = run.joint(phase.to)
     goal, stop, attempt = run.number(phase.value, link), until(run, phase), run.attempt
@@ -353,7 +353,7 @@ def _joint(run: Run, phase: Phase) -> None:
             raise SkillError("slip or drop", (link,), f"the hand lost hold of {link}", joint=value)
 
 
-def _rise(run: Run, phase: Phase) -> None:
+def _rise(run: SkillRun, phase: Phase) -> None:
     world, hand, held = run.world, run.attempt.hand, run.attempt.held
     load = hand.frame()[1] if held is None else world.truth(held)[1]
     goal = hand.pose
@@ -361,7 +361,7 @@ def _rise(run: Run, phase: Phase) -> None:
     run.attempt.rise(goal, run.things() if held is None else (held,), *run.free_of(phase))
 
 
-def _home(run: Run, phase: Phase) -> None:
+def _home(run: SkillRun, phase: Phase) -> None:
     """Move to the home pose, or to a near pose if an opened link is in the way."""
     hand = run.attempt.hand
     home = pose_of(hand.arm, np.array(hand.hand.home))
@@ -372,11 +372,11 @@ def _home(run: Run, phase: Phase) -> None:
     )
 
 
-def _over(run: Run, phase: Phase) -> None:
+def _over(run: SkillRun, phase: Phase) -> None:
     run.measured |= reach_over(run.attempt, run.feature_of(phase.to)[0], run.numbers)
 
 
-MOTIONS: Mapping[str, Callable[[Run, Phase], None]] = {
+MOTIONS: Mapping[str, Callable[[SkillRun, Phase], None]] = {
     "": lambda run, phase: None,
     "line": _line,
     "yielding": _yielding,
@@ -393,7 +393,7 @@ WITHDRAWING = ("free", "home")
 """Motions from which a stopped hand withdraws."""
 
 
-CONDITIONS: Mapping[str, Callable[[Run], bool]] = {
+CONDITIONS: Mapping[str, Callable[[SkillRun], bool]] = {
     "empty": lambda run: run.attempt.held is None,
     "holding": lambda run: run.attempt.held is not None,
     "place": lambda run: run.roles.get("target", "") in run.world.embodiment.places,

@@ -21,7 +21,7 @@ from confab.reasoner.embodiment.values import Embodiment, Hand, Place, Robot
 from confab.sim.arms import read_arm
 from confab.sim.assembly import read_robot
 from confab.sim.bodies import height_of, outline
-from confab.sim.collision import Solid, Surroundings, box, column, fixed_spheres, read_mover
+from confab.sim.collision import Obstacles, Solid, box, column, fixed_spheres, read_mover
 from confab.sim.linkage import with_open_mechanisms
 from confab.sim.motion import Reacher, beyond
 from confab.sim.stages import MARGIN, Numbers, grip_stages, rises
@@ -244,7 +244,7 @@ def _reacher(embodiment: Embodiment, robot: Robot, hand: Hand, model: UrdfModel,
     """Return an arm with open fingers among furniture, mechanisms and the robot's trunk."""
     arms = [read_arm(model, other.arm, other.tip, other.turned, other.home) for other in robot.hands]
     arm = arms[robot.hands.index(hand)]
-    around = Surroundings((*map(box, embodiment.fixtures), *solids))
+    around = Obstacles((*map(box, embodiment.fixtures), *solids))
     around = around.plus(robot.name, fixed_spheres(model, arms))
     return Reacher(read_mover(model, arm, dict.fromkeys(hand.fingers, hand.opening)), around, MARGIN)
 

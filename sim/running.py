@@ -24,7 +24,7 @@ LEDGE = 0.01
 
 
 @dataclass
-class Run:
+class SkillRun:
     """A running skill: objects by role, settings, measured numbers, chosen grasp, gripped link or body, and perceived features."""
 
     attempt: Attempt

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from confab.sim.collision import Surroundings
+from confab.sim.collision import Obstacles
 from confab.sim.motion import SWIVELS, YAWS, poses_at
 from confab.sim.urdf import Array
 
@@ -33,7 +33,7 @@ class Stage:
 
     poses: Array
     ignored: tuple[str, ...] = ()
-    around: Surroundings | None = None
+    around: Obstacles | None = None
     closed: bool = False
     near: bool = False
     slack: float = 0.0

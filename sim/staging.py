@@ -13,7 +13,7 @@ from confab.reasoner.embodiment.values import Fixture, Mechanism, Shape
 from confab.sim.base import read_base
 from confab.sim.bodies import KINDS, packed
 from confab.sim.driving import update_kinematics
-from confab.sim.engine import Bead, Engine, Thing
+from confab.sim.engine import Bead, Engine, SimulatedBody
 from confab.sim.mechanisms import load_mechanism, overlap_of
 from confab.sim.perception import Draft
 from confab.sim.robot import load_robot
@@ -126,7 +126,7 @@ def _put(engine: Engine, name: str, place: str, perturb: Perturbation | None) ->
         depth, inside = _deepest(engine, body)
         if depth <= DEEP:
             engine.names[body] = name
-            engine.bodies[name] = Thing(body, shape)
+            engine.bodies[name] = SimulatedBody(body, shape)
             return
         pybullet.removeBody(body, physicsClientId=engine.client)
     raise ValueError(

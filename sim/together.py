@@ -14,7 +14,7 @@ from threading import Semaphore, Thread
 import numpy as np
 import pybullet
 
-from confab.planner.acting.schedule import Slot, partial_order, ready, urgency_of, worker_of, workers_of
+from confab.planner.acting.schedule import WorkerSlot, partial_order, ready, urgency_of, worker_of, workers_of
 from confab.planner.plan import Step
 from confab.reasoner.symbols import Problem
 from confab.sim.verdict import Verdict
@@ -37,7 +37,7 @@ LOOKING = 6
 class Performance:
     """The result of concurrent execution: time slots and verdicts of the primitives, and seconds in which the arms touched."""
 
-    slots: tuple[Slot, ...]
+    slots: tuple[WorkerSlot, ...]
     verdicts: tuple[Verdict, ...]
     touching: float
 
@@ -47,7 +47,7 @@ class Performance:
         return all(verdict.ok for verdict in self.verdicts) and self.touching == 0
 
 
-class _Job:
+class _RunningPrimitive:
     """A primitive that runs in a separate thread."""
 
     def __init__(self, world: PhysicsWorld, step: Step, position: int, worker: str) -> None:
@@ -110,13 +110,13 @@ def perform_together(
         here, there = where[index[id(one)]](), where[index[id(other)]]()
         return here is None or there is None or float(np.linalg.norm(here - there)) >= room
 
-    step_once, jobs, current = world.run, list[_Job](), list[_Job]()
+    step_once, jobs, current = world.run, list[_RunningPrimitive](), list[_RunningPrimitive]()
 
     def wait_for(steps: int) -> None:
         for _ in range(steps):
             current[-1].wait()
 
-    done: dict[int, tuple[Slot, Verdict]] = {}
+    done: dict[int, tuple[WorkerSlot, Verdict]] = {}
     touching = 0
     world.run = wait_for  # type: ignore[method-assign]
     try:
@@ -124,7 +124,7 @@ def perform_together(
             if all(verdict.ok for _, verdict in done.values()):
                 running = [job.position for job in jobs]
                 for i in ready(order, primitives, workers, [*done, *running], running, urgency, apart):
-                    jobs.append(_Job(world, primitives[i], i, worker_of(primitives[i], workers)))
+                    jobs.append(_RunningPrimitive(world, primitives[i], i, worker_of(primitives[i], workers)))
             if not jobs:
                 break
             for job in list(jobs):
@@ -136,7 +136,7 @@ def perform_together(
                 job.advance()
                 current.pop()
                 if job.verdict is not None:
-                    slot = Slot(job.step, job.position, job.worker, job.begin, world.seconds)
+                    slot = WorkerSlot(job.step, job.position, job.worker, job.begin, world.seconds)
                     done[job.position] = slot, job.verdict
                     jobs.remove(job)
             step_once(1)

@@ -10,7 +10,7 @@ import numpy as np
 from confab.reasoner.embodiment.values import Phase
 from confab.sim.measuring import finger_force, finger_forces
 from confab.sim.motion import line
-from confab.sim.running import Run
+from confab.sim.running import SkillRun
 from confab.sim.urdf import Array
 from confab.sim.verdict import SkillError
 
@@ -36,19 +36,19 @@ CENTRED = 0.001
 """Maximum difference in metres between the openings of the two fingers of a centred hand."""
 
 
-def _open(run: Run, phase: Phase) -> None:
+def _open(run: SkillRun, phase: Phase) -> None:
     run.attempt.hand.open(run.spread)
     if run.attempt.held is not None or run.gripped:
         run.world.run(round(run.number("release") * run.world.rate))
         run.attempt, run.gripped = run.attempt.released(), ""
 
 
-def _shut(run: Run, phase: Phase) -> None:
+def _shut(run: SkillRun, phase: Phase) -> None:
     run.attempt.hand.close()
     run.world.run(CLOSING // 6)
 
 
-def _grasp(run: Run, phase: Phase) -> None:
+def _grasp(run: SkillRun, phase: Phase) -> None:
     """Close the fingers until both fingers have pressed for a while; centre a hand that holds a link."""
     world, hand, name = run.world, run.attempt.hand, run.roles["object"]
     hand.close()
@@ -71,7 +71,7 @@ def _grasp(run: Run, phase: Phase) -> None:
     run.measured |= {"force_n": finger_force(run, name), "seconds": waited / world.rate}
 
 
-def _grope(run: Run) -> None:
+def _grope(run: SkillRun) -> None:
     """Open the hand, centre it on a handle that only one finger has touched, and begin to grasp again."""
     hand, shift = run.attempt.hand, off_centre(run)
     hand.open(run.spread)
@@ -80,7 +80,7 @@ def _grope(run: Run) -> None:
     hand.close()
 
 
-def _centre(run: Run) -> None:
+def _centre(run: SkillRun) -> None:
     """Shift the hand until both fingers are closed equally far, since a held link does not yield."""
     hand = run.attempt.hand
     for _ in range(3):
@@ -90,7 +90,7 @@ def _centre(run: Run) -> None:
         run.world.run(2 * LOOKING)
 
 
-def _shift(run: Run, shift: Array) -> bool:
+def _shift(run: SkillRun, shift: Array) -> bool:
     """Shift the hand by a vector (3,) in metres if the arm can reach the new pose; return whether the arm can."""
     hand = run.attempt.hand
     pose = hand.pose
@@ -101,7 +101,7 @@ def _shift(run: Run, shift: Array) -> bool:
     return bool(valid.all())
 
 
-def off_centre(run: Run) -> Array:
+def off_centre(run: SkillRun) -> Array:
     """Return the shift (3,) of the hand that makes the openings of both fingers equal."""
     hand = run.attempt.hand
     first, second = hand.openings()
@@ -109,7 +109,7 @@ def off_centre(run: Run) -> Array:
     return shift
 
 
-def draw_back(run: Run) -> None:
+def draw_back(run: SkillRun) -> None:
     """Draw the hand back while its fingers press against a body in front of the hand."""
     hand = run.attempt.hand
     for _ in range(YIELDS):
@@ -117,7 +117,7 @@ def draw_back(run: Run) -> None:
             return
 
 
-FINGERS: Mapping[str, Callable[[Run, Phase], None]] = {
+FINGERS: Mapping[str, Callable[[SkillRun, Phase], None]] = {
     "": lambda run, phase: None,
     "open": _open,
     "shut": _shut,
@@ -125,7 +125,7 @@ FINGERS: Mapping[str, Callable[[Run, Phase], None]] = {
 }
 
 
-def go_around(run: Run, phase: Phase, name: str, goal: Array) -> None:
+def go_around(run: SkillRun, phase: Phase, name: str, goal: Array) -> None:
     """Move the open fingers around an object; after contact with one finger, shift the hand to the finger's side and continue.
 
     On contact with the palm, the object is far enough inside the hand, so the hand draws back a little and stops. On its way
@@ -159,7 +159,7 @@ def go_around(run: Run, phase: Phase, name: str, goal: Array) -> None:
     run.arrived(goal)
 
 
-def room(run: Run, target: str, yaw: Array | None = None) -> float:
+def room(run: SkillRun, target: str, yaw: Array | None = None) -> float:
     """Return the gap in metres between each open finger and the object with a feature; infinite for a feature of another thing.
 
     The hand has the heading `yaw`, or the heading with the most room.

@@ -50,7 +50,7 @@ class Spheres:
 
 
 @dataclass(frozen=True)
-class Primitive:
+class LinkShape:
     """A box (half extents) or cylinder (radius, radius, half height) of a link, in the world at the zero posture."""
 
     name: str
@@ -68,7 +68,7 @@ class UrdfModel:
     frames: Mapping[str, tuple[Array, Array]]
     spheres: Mapping[str, Spheres]
     parents: Mapping[str, Joint]
-    primitives: Mapping[str, tuple[Primitive, ...]]
+    primitives: Mapping[str, tuple[LinkShape, ...]]
 
     @cached_property
     def chains(self) -> Mapping[str, tuple[Joint, ...]]:
@@ -224,7 +224,7 @@ def _cover(link: ET.Element, turn: Array, origin: Array, folder: Path) -> Sphere
     return Spheres(np.concatenate(centers), np.concatenate(radii))
 
 
-def _primitives(link: ET.Element, turn: Array, origin: Array, folder: Path) -> Iterator[Primitive]:
+def _primitives(link: ET.Element, turn: Array, origin: Array, folder: Path) -> Iterator[LinkShape]:
     """Yield the collision shapes of a link as boxes and cylinders.
 
     The cylinder around a sphere replaces the sphere, and the box around a mesh replaces the mesh.
@@ -244,7 +244,7 @@ def _primitives(link: ET.Element, turn: Array, origin: Array, folder: Path) -> I
             radius = float(shape.get("radius", 0.0))
             length = float(shape.get("length", 0.0)) + (0.0 if shape.tag == "cylinder" else 2 * radius)
             half = np.array([radius, radius, length / 2])
-        yield Primitive(collision.get("name", ""), kind, half, origin + turn @ shift, turn @ local)
+        yield LinkShape(collision.get("name", ""), kind, half, origin + turn @ shift, turn @ local)
 
 
 def _mesh(shape: ET.Element, folder: Path) -> tuple[Path, tuple[float, float, float]]:

@@ -2,6 +2,7 @@
 
 import ast
 import re
+from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -23,10 +24,8 @@ OLD_NAMES = {
 Event, RetryPolicy, Subgoal, Subgoals, SearchBudget, dead_end, on_no_plan, hierarchical_plan, repairs, dead_end_check,
 RulePolicy, achieve, wasted_effort."""
 NEW_ROOMS = ("planner", "reasoner", "confab", "sim")
-UNIQUE = frozenset(
-    ["Call", "Change", "Event", "PhysicsWorld", "PythonWriter", "SearchBudget", "Subgoals", "SymmetryClasses", "World"]
-)
-"""Names of classes and types that have one meaning in all rooms."""
+SHARED = frozenset(["Episode", "Outcome", "Step", "Table", "Verdict"])
+"""Names of two classes: an episode, result or step and its JSON, a planner's state and a user's table, verdicts of a world."""
 IN_FILES = ('"facts of what hands reach"', '"somebody"', '"nobody"')
 """Texts that files contain: the name of a kind of file, and facts in files of memories."""
 
@@ -59,14 +58,21 @@ def defined(path: Path) -> Iterator[str]:
             yield from (target.id for target in node.targets if isinstance(target, ast.Name))
 
 
-def test_replaced_names_do_not_come_back_and_common_names_have_one_meaning() -> None:
+def test_replaced_names_do_not_come_back() -> None:
     modules = [file for room in NEW_ROOMS for file in sorted((ROOT / room).rglob("*.py"))]
     names = {file.relative_to(ROOT).as_posix(): set(defined(file)) for file in modules}
     back = {file: found & OLD_NAMES for file, found in names.items() if found & OLD_NAMES}
     assert back == {}, "use the new name (the docstring of OLD_NAMES)"
-    twice = {
-        name: files for name in UNIQUE if len(files := [file for file, found in names.items() if name in found]) > 1
-    }
+
+
+def test_each_name_of_a_class_denotes_one_class() -> None:
+    files: dict[str, list[str]] = defaultdict(list)
+    for room in NEW_ROOMS:
+        for file in sorted((ROOT / room).rglob("*.py")):
+            for node in ast.parse(file.read_text("utf-8")).body:
+                if isinstance(node, ast.ClassDef):
+                    files[node.name.lstrip("_")].append(file.relative_to(ROOT).as_posix())
+    twice = {name: found for name, found in files.items() if len(found) > 1 and name not in SHARED}
     assert twice == {}, "one name for one thing"
 
 

@@ -12,7 +12,7 @@ from itertools import count
 
 from confab.planner.levels import levels_left
 from confab.planner.plan import Outcome, Status
-from confab.planner.validation import BehaviorReader, Facts, validate
+from confab.planner.validation import BehaviorReader, LoggedState, validate
 from confab.reasoner.amounts import meets
 from confab.reasoner.symbols import FALSE, Problem, Symbol
 from worlds.writing import quantified
@@ -28,7 +28,7 @@ def by_the_checker(problem: Problem) -> Callable[[State], Iterable[tuple[float, 
     steps = list(quantified(problem, problem.domain.levels[-1]))
 
     def successors(state: State) -> Iterable[tuple[float, State]]:
-        facts = Facts(problem, state)
+        facts = LoggedState(problem, state)
         for behavior, arguments in steps:
             changes = rules.changes(behavior, arguments, facts)
             if changes is not None:
@@ -55,7 +55,7 @@ def cheapest(problem: Problem, successors: Successors = by_the_checker, most: in
         return frozenset(s for s, r in rests.items() if state[s] != r and (s in old or state[s] != before[s]))
 
     def reached(state: State) -> bool:
-        facts = Facts(problem, state)
+        facts = LoggedState(problem, state)
         return all(meets(facts.value(s.situation, s.arguments) or FALSE, wanted) for s, wanted in problem.goal.items())
 
     start = frozenset(problem.initial.items()), frozenset[Symbol]()

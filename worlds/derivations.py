@@ -12,7 +12,7 @@ from random import Random
 
 from confab.planner.hierarchical.operators import Program
 from confab.planner.transitions import Table, key_of
-from confab.planner.validation import Facts
+from confab.planner.validation import LoggedState
 from confab.reasoner.amounts import written
 from confab.reasoner.graph.knowledge import load
 from confab.reasoner.reading.problem import read
@@ -65,7 +65,7 @@ def derived(problem: Problem) -> Iterator[tuple[str, Derived]]:
     ]
     table = Table(problem.domain.situations, problem.initial)
     Program(problem).bind(table)
-    facts = Facts(problem, problem.initial)
+    facts = LoggedState(problem, problem.initial)
     yield "search", {_row(s) for s in defined if table.now[s.situation].get(key_of(s.arguments)) == TRUE}
     yield "checker", {_row(s) for s in defined if facts.value(s.situation, s.arguments) == TRUE}
 

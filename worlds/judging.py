@@ -27,7 +27,7 @@ from confab.plan_options import NO_ENGINE
 from confab.planner.acting.episode import End
 from confab.planner.certificates import Certificate
 from confab.planner.plan import Outcome, Plan, Reason, Status, UnsolvableError
-from confab.planner.validation import Facts, successor, validate
+from confab.planner.validation import LoggedState, successor, validate
 from confab.planning import plan
 from confab.reasoner.amounts import written
 from confab.reasoner.graph.knowledge import KnowledgeError
@@ -353,7 +353,7 @@ class Judge:
             values = {symbol: _text(state[slot]) for symbol, slot in meant.slots.items() if slot < meant.stated}
             before = {**problem.initial, **values}
             stated = [symbol for symbol in values if symbol.situation not in problem.domain.remembers]
-            facts = Facts(problem, before)
+            facts = LoggedState(problem, before)
             for symbol in self.rng.sample(derived, len(derived)):
                 said = facts.value(symbol.situation, symbol.arguments) or FALSE
                 if said != meant.value(state, symbol):

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from confab.planner.validation import BehaviorReader, Facts
+from confab.planner.validation import BehaviorReader, LoggedState
 from confab.reasoner.symbols import FALSE, TRUE, AnyOf, Behavior, Condition, Problem, Symbol, ValueCondition, Witness
 
 Codes = NDArray[np.uint64]
@@ -38,7 +38,7 @@ class Truth:
     shortest: int | None
 
 
-class Asked(Facts):
+class Asked(LoggedState):
     """A state that records the symbols that are read."""
 
     def __init__(self, problem: Problem, values: dict[Symbol, str]) -> None:

@@ -10,7 +10,7 @@ from confab.page.lanes import axis_end, id_of, rows_of
 from confab.page.markup import measurement, plain, spaced
 from confab.page.places import map_of
 from confab.page.results import (
-    Executed,
+    ExecutionView,
     Planned,
     again_of,
     alarm_of,
@@ -45,7 +45,7 @@ def page_data(
     scene: Known,
     result: Planned | None = None,
     report: Report | None = None,
-    execution: Executed | None = None,
+    execution: ExecutionView | None = None,
     learned: Memory | None = None,
     again: str = "",
 ) -> PageData:
@@ -164,7 +164,9 @@ def timeline_data(
     return data
 
 
-def _timeline(problem: Problem, result: Planned | None, report: Report | None, execution: Executed | None) -> Timeline:
+def _timeline(
+    problem: Problem, result: Planned | None, report: Report | None, execution: ExecutionView | None
+) -> Timeline:
     if execution is not None:
         return of_episode(problem, execution.episode)
     if report is not None:

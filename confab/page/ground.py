@@ -30,7 +30,7 @@ class Area:
 
 
 @dataclass(frozen=True)
-class Ground:
+class MapGround:
     """The background of the map: positions of places, areas, connections between places, and positions of robots.
 
     The x axis points to the right, and the y axis points down. If `metric` is true, positions are in metres, otherwise positions
@@ -45,7 +45,9 @@ class Ground:
     note: str = ""
 
 
-def ground_of(problem: Problem, embodiment: Embodiment | None, shapes: Iterable[tuple[str, str]] = ()) -> Ground | None:
+def ground_of(
+    problem: Problem, embodiment: Embodiment | None, shapes: Iterable[tuple[str, str]] = ()
+) -> MapGround | None:
     """Return the background of the map, or None if the problem has no places.
 
     Places are drawn at their coordinates. Without coordinates, places that static relations connect are drawn near each other;
@@ -64,11 +66,11 @@ def ground_of(problem: Problem, embodiment: Embodiment | None, shapes: Iterable[
     return _drawn(shapes) or _connected(problem) or _in_order(problem)
 
 
-def _too_many(number: int) -> Ground:
-    return Ground({}, note=f"there is no map, since {number:,} places are too many for one ({MOST_SPOTS} at most)")
+def _too_many(number: int) -> MapGround:
+    return MapGround({}, note=f"there is no map, since {number:,} places are too many for one ({MOST_SPOTS} at most)")
 
 
-def _furnished(embodiment: Embodiment) -> Ground:
+def _furnished(embodiment: Embodiment) -> MapGround:
     """Return the furniture and places of an embodiment in the view of the film, whose camera is opposite the robots."""
     if len(embodiment.places) > MOST_SPOTS:
         return _too_many(len(embodiment.places))
@@ -100,7 +102,7 @@ def _furnished(embodiment: Embodiment) -> Ground:
     for name, points in of.items():  # the area that a mechanism occupies when every joint is open
         (left, right), (back, front) = ((min(side), max(side)) for side in zip(*points, strict=True))
         areas.append(Area(name, ((left, back), (right, back), (right, front), (left, front))))
-    return Ground(
+    return MapGround(
         {place.name: seen(*place.position[:2]) for place in places.values()},
         tuple(areas),
         robots=tuple((robot.name, seen(*robot.position[:2])) for robot in embodiment.robots),
@@ -108,7 +110,7 @@ def _furnished(embodiment: Embodiment) -> Ground:
     )
 
 
-def _drawn(shapes: Iterable[tuple[str, str]]) -> Ground | None:
+def _drawn(shapes: Iterable[tuple[str, str]]) -> MapGround | None:
     """Return the polygons and points of shapes, or None.
 
     An individual without a point is drawn at the mean of its polygon's corners.
@@ -129,10 +131,10 @@ def _drawn(shapes: Iterable[tuple[str, str]]) -> Ground | None:
         return None
     if len(spots) > MOST_SPOTS:
         return _too_many(len(spots))
-    return Ground(spots, tuple(areas), note="to scale")
+    return MapGround(spots, tuple(areas), note="to scale")
 
 
-def _connected(problem: Problem) -> Ground | None:
+def _connected(problem: Problem) -> MapGround | None:
     """Return a layout in which connected places are close together. Return None for fewer than three places."""
     import networkx
 
@@ -149,12 +151,12 @@ def _connected(problem: Problem) -> Ground | None:
     places = networkx.kamada_kawai_layout(graph)
     spots = {name: (round(STRETCH * float(x), 4), round(float(y), 4)) for name, (x, y) in places.items()}
     ways = tuple(sorted((min(pair), max(pair)) for pair in graph.edges))
-    return Ground(
+    return MapGround(
         spots, ways=ways, metric=False, note="places have no coordinates; lines connect them as static relations do"
     )
 
 
-def _in_order(problem: Problem) -> Ground | None:
+def _in_order(problem: Problem) -> MapGround | None:
     """Return a layout of the places in rows, ordered by name. Return None for fewer than three places."""
     kinds = {
         problem.domain.situations[symbol.situation].range
@@ -171,7 +173,7 @@ def _in_order(problem: Problem) -> Ground | None:
     wide = max(3, round((2.2 * len(places)) ** 0.5))
     names = sorted(places, key=natural)
     spots = {name: (float(number % wide), float(number // wide)) for number, name in enumerate(names)}
-    return Ground(spots, metric=False, note="places have neither coordinates nor connections: they stand in order")
+    return MapGround(spots, metric=False, note="places have neither coordinates nor connections: they stand in order")
 
 
 def natural(name: str) -> list[tuple[int, str]]:

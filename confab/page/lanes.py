@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from confab.page.markup import plain
-from confab.page.schema import Interval, Row
+from confab.page.schema import Interval, TimelineRow
 from confab.page.timeline import Bar, Timeline
 from confab.reasoner.symbols import FALSE, Symbol
 
@@ -29,10 +29,10 @@ def axis_end(timeline: Timeline) -> float:
     return round((timeline.end or 1.0) * (1 + LAST if late else 1), 4)
 
 
-def rows_of(timeline: Timeline, labels: Labels) -> tuple[list[Row], int]:
+def rows_of(timeline: Timeline, labels: Labels) -> tuple[list[TimelineRow], int]:
     """Return the rows of the timeline, and the number of symbols that have no row."""
     by_path = timeline.by_path
-    rows: list[Row] = []
+    rows: list[TimelineRow] = []
     for level in sorted({step.level for step in timeline.plan.walk() if step.steps}):
         on = [s for s in timeline.plan.walk() if s.level == level and s.steps and s.path in by_path]
         rows += _lanes("levels", f"level {level}", [by_path[step.path] for step in on], labels)
@@ -55,14 +55,14 @@ def rows_of(timeline: Timeline, labels: Labels) -> tuple[list[Row], int]:
             for i, period in enumerate(periods)
             if i == len(periods) - 1 or period.end > period.begin
         ]
-        row: Row = {"group": group, "label": labels.about(symbol), "bars": bars}
+        row: TimelineRow = {"group": group, "label": labels.about(symbol), "bars": bars}
         if (met := timeline.met(symbol)) is not None:
             row["met"] = met
         rows.append(row)
     return rows, max(0, fixed - MOST_FIXED)
 
 
-def _lanes(group: str, label: str, bars: Sequence[Bar], labels: Labels) -> list[Row]:
+def _lanes(group: str, label: str, bars: Sequence[Bar], labels: Labels) -> list[TimelineRow]:
     """Distribute bars over rows in which no two bars overlap; the number of rows is minimal."""
     rows: list[list[Bar]] = []
     for bar in sorted(bars, key=lambda bar: (bar.begin, bar.end)):

@@ -10,7 +10,7 @@ from confab.known import Known
 from confab.labels import Labels
 from confab.page.data import page_labels, timeline_data
 from confab.page.results import goals_of
-from confab.page.schema import PageData, Row
+from confab.page.schema import PageData, TimelineRow
 from confab.page.timeline import Bar, Period, Timeline
 from confab.planner.acting.episode import Event
 from confab.planner.plan import Step
@@ -117,6 +117,6 @@ class Following:
         return data
 
 
-def _still_open(row: Row) -> Row:
+def _still_open(row: TimelineRow) -> TimelineRow:
     """Return a row without the mark of an unmet goal, since the execution isn't finished."""
     return {key: value for key, value in row.items() if key != "met" or value}  # type: ignore[return-value]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from confab.page.ground import Ground
+from confab.page.ground import MapGround
 from confab.page.lanes import tone_of
-from confab.page.schema import MapData, Thing
+from confab.page.schema import MapData, MapObject
 from confab.page.timeline import Timeline
 from confab.reasoner.symbols import Fact
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from confab.labels import Labels
 
 
-def map_of(ground: Ground, timeline: Timeline, labels: Labels) -> MapData:
+def map_of(ground: MapGround, timeline: Timeline, labels: Labels) -> MapData:
     """Return the map from its background and the places of objects in time."""
     return {
         "areas": [
@@ -29,7 +29,7 @@ def map_of(ground: Ground, timeline: Timeline, labels: Labels) -> MapData:
     }
 
 
-def _things(ground: Ground, timeline: Timeline, labels: Labels) -> list[Thing]:
+def _things(ground: MapGround, timeline: Timeline, labels: Labels) -> list[MapObject]:
     """Return the objects on the map, each with its places in time.
 
     The place of an object is the value of a symbol of the object. The first value of this symbol is a place on the map, and the
@@ -37,7 +37,7 @@ def _things(ground: Ground, timeline: Timeline, labels: Labels) -> list[Thing]:
     kind, the map uses the symbol whose values are on the map for the longest time.
     """
     situations = timeline.problem.domain.situations
-    found: dict[str, tuple[float, Thing]] = {}
+    found: dict[str, tuple[float, MapObject]] = {}
     for symbol, periods in sorted(timeline.phases.items()):
         if len(symbol.arguments) != 1 or not periods or periods[0].value not in ground.spots:
             continue

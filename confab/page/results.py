@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Protocol
 from confab import ontology
 from confab.page.lanes import id_of
 from confab.page.markup import measurement, number, plain
-from confab.page.schema import Alarm, Film, GoalData, Tile
+from confab.page.schema import Alarm, FilmData, GoalData, Tile
 from confab.page.timeline import Timeline
 from confab.planner.plan import Outcome, SoftGoal, Status
 from confab.planner.plan_costs import cost_of
@@ -47,7 +47,7 @@ class Planned(Protocol):
         """Return a remark on possible cheaper plans, as `confab.planning.Result.dearer`."""
 
 
-class Executed(Protocol):
+class ExecutionView(Protocol):
     """The part of `confab.execution.Execution` that the page needs."""
 
     @property
@@ -69,7 +69,9 @@ class Executed(Protocol):
         """Return a summary of the execution in one line."""
 
 
-def status_of(outcome: Outcome | None, report: Report | None, execution: Executed | None) -> tuple[bool | None, str]:
+def status_of(
+    outcome: Outcome | None, report: Report | None, execution: ExecutionView | None
+) -> tuple[bool | None, str]:
     """Return whether a run has succeeded (None if unknown), and the result of the run as text."""
     if execution is not None:
         return execution.reached, execution.episode.status.value
@@ -85,7 +87,7 @@ def tiles_of(
     timeline: Timeline | None,
     outcome: Outcome | None,
     report: Report | None,
-    execution: Executed | None,
+    execution: ExecutionView | None,
     soft: Sequence[SoftGoal] = (),
 ) -> list[Tile]:
     """Return the figures of a run, such as the number of primitives and the planning time."""
@@ -129,7 +131,7 @@ def tiles_of(
 
 
 def alarm_of(
-    timeline: Timeline, labels: Labels, outcome: Outcome | None, report: Report | None, execution: Executed | None
+    timeline: Timeline, labels: Labels, outcome: Outcome | None, report: Report | None, execution: ExecutionView | None
 ) -> Alarm | None:
     """Return the failure of a run, or None if the run didn't fail."""
     if execution is not None and execution.reached:
@@ -171,7 +173,7 @@ def _proof(outcome: Outcome, labels: Labels) -> list[str]:
     return [] if outcome.certificate is None else list(proved(outcome.certificate, labels))
 
 
-def film_of(report: Report | None) -> Film | None:
+def film_of(report: Report | None) -> FilmData | None:
     """Return the film of a verification, with the first still picture as its poster; return None if there is no film."""
     if report is None or report.video is None or not report.video.is_file():
         return None
@@ -180,7 +182,7 @@ def film_of(report: Report | None) -> Film | None:
     if report.video.stat().st_size <= LARGEST_FILM:
         source = f"data:{kind};base64,{b64encode(report.video.read_bytes()).decode()}"
     caption = f"{report.film_speed:g} × as fast as simulated, seed {report.rollouts[0].seed}"
-    film: Film = {"source": source, "kind": kind, "speed": report.film_speed, "caption": caption}
+    film: FilmData = {"source": source, "kind": kind, "speed": report.film_speed, "caption": caption}
     if still := next(iter(sorted(report.video.with_suffix("").glob("*.png"))), None):
         film["poster"] = f"data:image/jpeg;base64,{b64encode(_jpeg(still)).decode()}"
     return film
@@ -223,7 +225,9 @@ def goals_of(timeline: Timeline, labels: Labels, planned: bool) -> list[GoalData
     return found
 
 
-def again_of(scene: Known, problem: Problem, report: Report | None, execution: Executed | None, physical: bool) -> str:
+def again_of(
+    scene: Known, problem: Problem, report: Report | None, execution: ExecutionView | None, physical: bool
+) -> str:
     """Return the command that repeats a planning call, a verification or an execution."""
     path = scene.knowledge.path
     name = scene.iri if path is None else path.stem if path.is_relative_to(ontology.ROOT) else str(path)

@@ -23,7 +23,7 @@ class Interval(TypedDict, total=False):
     slack: float
 
 
-class Row(TypedDict, total=False):
+class TimelineRow(TypedDict, total=False):
     """A row of the timeline.
 
     The row's `group` is ``levels``, ``actors``, ``changes``, ``wanted`` or ``fixed``. For a symbol, `met` tells whether the
@@ -55,7 +55,7 @@ class StepData(TypedDict, total=False):
     facts: list[tuple[str, str]]
 
 
-class Thing(TypedDict):
+class MapObject(TypedDict):
     """An object on the map.
 
     Each element of `at` has a time, the object's place (or an empty text), a sentence, and a tone (the meaning of a colour).
@@ -89,7 +89,7 @@ class MapData(TypedDict):
     ways: list[tuple[str, str]]
     places: list[Spot]
     robots: list[Spot]
-    things: list[Thing]
+    things: list[MapObject]
     metric: bool
     note: str
 
@@ -103,7 +103,7 @@ class Alarm(TypedDict, total=False):
     measured: list[tuple[str, str]]
 
 
-class Film(TypedDict, total=False):
+class FilmData(TypedDict, total=False):
     """A film of the run.
 
     `speed` is the ratio of simulated time to the film's time. The page shows the picture `poster` before the film is played.
@@ -132,7 +132,7 @@ class GoalData(TypedDict, total=False):
     met: bool
 
 
-class Mark(TypedDict):
+class TimelineMark(TypedDict):
     """The time and the text of an intervention or of a change of the plan."""
 
     at: float
@@ -189,13 +189,13 @@ class PageData(TypedDict, total=False):
     headline: str
     tiles: list[Tile]
     alarm: Alarm
-    film: Film
+    film: FilmData
     map: MapData
     end: float
     unit: str
     now: float
-    marks: list[Mark]
-    rows: list[Row]
+    marks: list[TimelineMark]
+    rows: list[TimelineRow]
     hidden: int
     steps: list[StepData]
     goals: list[GoalData]

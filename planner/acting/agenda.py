@@ -10,7 +10,7 @@ from confab.reasoner.symbols import Problem, State, Symbol
 
 
 @dataclass
-class Agenda:
+class RemainingSteps:
     """The steps still to be executed; the first step may be partly executed.
 
     Attributes

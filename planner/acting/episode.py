@@ -89,7 +89,7 @@ class Surprise:
 
 
 @dataclass(frozen=True)
-class Seen:
+class BeliefChange:
     """A change of a symbol's value in the executive's belief.
 
     The new value is `None` if the symbol is no longer observable.
@@ -100,13 +100,13 @@ class Seen:
     value: str | None
 
 
-def changes(before: State, after: State, seconds: float) -> list[Seen]:
+def changes(before: State, after: State, seconds: float) -> list[BeliefChange]:
     """Return the changes from a situation to another situation that was observed at a time."""
     changed = (s for s in sorted(before.keys() | after.keys()) if before.get(s) != after.get(s))
-    return [Seen(seconds, symbol, after.get(symbol)) for symbol in changed]
+    return [BeliefChange(seconds, symbol, after.get(symbol)) for symbol in changed]
 
 
-def situation(initial: State, course: Iterable[Seen], seconds: float = math.inf) -> dict[Symbol, str]:
+def situation(initial: State, course: Iterable[BeliefChange], seconds: float = math.inf) -> dict[Symbol, str]:
     """Return the situation at a time: the initial situation with the changes that were observed until this time."""
     state = dict(initial)
     for seen in course:
@@ -200,7 +200,7 @@ class Episode:
         The failed primitives, from which the memory learns.
     missed : tuple of Intervention
         The interventions that didn't take place, because the episode ended earlier.
-    course : tuple of Seen
+    course : tuple of BeliefChange
         The changes of the situation from `initial` to `observed`, in order of time.
     refuted : tuple of Refutation
         Behaviours that motion planning found impossible in a situation and that the executive replaced.
@@ -224,7 +224,7 @@ class Episode:
     failures: tuple[Failure, ...] = ()
     seconds: Mapping[str, float] = field(default_factory=dict)
     missed: tuple[Intervention, ...] = ()
-    course: tuple[Seen, ...] = ()
+    course: tuple[BeliefChange, ...] = ()
     refuted: tuple[Refutation, ...] = ()
     discovered: tuple[tuple[Discovery, float], ...] = ()
     measured: bool = True

@@ -19,7 +19,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from time import perf_counter
 
-from confab.planner.acting.agenda import Agenda, Postponed, ReplanRequest
+from confab.planner.acting.agenda import Postponed, RemainingSteps, ReplanRequest
 from confab.planner.acting.belief import Belief
 from confab.planner.acting.episode import (
     End,
@@ -38,7 +38,7 @@ from confab.planner.acting.repair import difference, repair_or_replan, replan, v
 from confab.planner.acting.retries import DEFAULT, Retries, RetryPolicy
 from confab.planner.acting.step_trees import all_steps, first_chain, tree_of, without_first
 from confab.planner.acting.unreached import blamed, blocked, with_discoveries
-from confab.planner.acting.world import INTERRUPTED, WITHOUT_EFFECT, Guarded, Report, Verdict, World, WorldError
+from confab.planner.acting.world import INTERRUPTED, WITHOUT_EFFECT, Guarded, Verdict, World, WorldError, WorldReport
 from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, renumbered
 from confab.planner.validation import open_goals, successor
@@ -86,7 +86,9 @@ def act(
     """
     if caution is not None and plan is None:
         problem = caution.applied(problem, planner or hierarchical_plan, retry_policy.planning)
-    run = _Run(Belief(problem), Guarded(world), list(interventions), planner, Retries(retry_policy), observer, repairs)
+    run = _RunningEpisode(
+        Belief(problem), Guarded(world), list(interventions), planner, Retries(retry_policy), observer, repairs
+    )
     try:
         run.look(run.belief.state)
         run.start(plan)
@@ -113,7 +115,7 @@ def act(
 
 
 @dataclass
-class _Run:
+class _RunningEpisode:
     """An episode in progress. `act` is the main loop; each other method is one action of the loop."""
 
     belief: Belief
@@ -128,7 +130,7 @@ class _Run:
     request: ReplanRequest = field(default_factory=ReplanRequest)
 
     def __post_init__(self) -> None:
-        self.record, self.agenda = Record(self.belief.state), Agenda(self.belief.problem)
+        self.record, self.agenda = Record(self.belief.state), RemainingSteps(self.belief.problem)
 
     # --------------------------------------------------------------------------------------------------- beginning, end
 
@@ -223,7 +225,7 @@ class _Run:
         seen = self.world.observe()
         if verdict.ok and self.without_effect(changes, seen):
             text = f"{step} was reported as done, but {changes[0]} is not seen"
-            verdict = Report(False, WITHOUT_EFFECT, step.arguments, text)
+            verdict = WorldReport(False, WITHOUT_EFFECT, step.arguments, text)
         there = bool(changes) and all(seen.get(fact.symbol) == fact.value for fact in changes)
         done = verdict.ok or (there and verdict.code != INTERRUPTED)
         surprises = self.look(expected if done else dict(before), seen)

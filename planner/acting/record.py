@@ -6,13 +6,13 @@ from dataclasses import dataclass, field
 
 from confab.planner.acting.discovery import Discovery
 from confab.planner.acting.episode import (
+    BeliefChange,
     End,
     Episode,
     ExecutedPrimitive,
     Failure,
     Intervention,
     Replan,
-    Seen,
     changes,
 )
 from confab.planner.acting.step_trees import tree_of
@@ -31,7 +31,7 @@ class Record:
     reasons: list[Reason] = field(default_factory=list)
     events: list[ExecutedPrimitive] = field(default_factory=list)
     interventions: list[tuple[Intervention, float]] = field(default_factory=list)
-    course: list[Seen] = field(default_factory=list)
+    course: list[BeliefChange] = field(default_factory=list)
     replans: list[Replan] = field(default_factory=list)
     failures: list[Failure] = field(default_factory=list)
     refuted: dict[Refutation, None] = field(default_factory=dict)

@@ -23,7 +23,7 @@ Compatible = Callable[[Step, Step], bool]
 
 
 @dataclass(frozen=True)
-class Slot:
+class WorkerSlot:
     """A primitive in a schedule: its worker, its beginning and its end in seconds."""
 
     step: Step
@@ -83,7 +83,7 @@ def schedule(
     primitives: Sequence[Step],
     seconds_of: Mapping[int, float] | None = None,
     apart: Compatible = lambda one, other: True,
-) -> list[Slot]:
+) -> list[WorkerSlot]:
     """Return a schedule of primitives in which every worker begins each primitive as early as possible.
 
     Parameters
@@ -104,12 +104,12 @@ def schedule(
     order = partial_order(problem, primitives)
     urgency = _urgency(order, seconds)
     workers = workers_of(problem)
-    slots: dict[int, Slot] = {}
-    running: list[Slot] = []
+    slots: dict[int, WorkerSlot] = {}
+    running: list[WorkerSlot] = []
     now = 0.0
     while len(slots) < len(primitives):
         for i in ready(order, primitives, workers, slots.keys(), [s.position for s in running], urgency, apart):
-            slot = Slot(primitives[i], i, worker_of(primitives[i], workers), now, now + seconds[i])
+            slot = WorkerSlot(primitives[i], i, worker_of(primitives[i], workers), now, now + seconds[i])
             slots[i] = slot
             running.append(slot)
         now = min(slot.end for slot in running)
@@ -153,7 +153,7 @@ def worker_of(step: Step, workers: Iterable[str]) -> str:
     return next((argument for argument in step.arguments if argument in known), "")
 
 
-def makespan(slots: Sequence[Slot]) -> float:
+def makespan(slots: Sequence[WorkerSlot]) -> float:
     """Return the time at which the last primitive ends."""
     return max((slot.end for slot in slots), default=0.0)
 

@@ -7,15 +7,15 @@ from dataclasses import replace
 
 from confab.planner.acting.discovery import Discovery
 from confab.planner.acting.episode import Intervention, InterventionKind
-from confab.planner.acting.world import INTERRUPTED, Report
+from confab.planner.acting.world import INTERRUPTED, WorldReport
 from confab.planner.plan import Step
 from confab.planner.validation import successor
 from confab.reasoner.aggregates.totals import following
 from confab.reasoner.possible import PLACE, refuse_impossible
 from confab.reasoner.symbols import Problem, State, Symbol, spread_to
 
-DONE = Report(True)
-FaultInjection = Callable[[Step, State], Report | None]
+DONE = WorldReport(True)
+FaultInjection = Callable[[Step, State], WorldReport | None]
 """Function that decides, for tests, whether and how a primitive fails in a situation."""
 
 
@@ -53,7 +53,7 @@ class SymbolicWorld:
         """Record interventions with their times."""
         self._waiting = sorted((i for i in interventions if i.at is not None), key=lambda i: i.at or 0.0)
 
-    def execute(self, step: Step) -> Report:
+    def execute(self, step: Step) -> WorldReport:
         """Execute a primitive; an intervention stops the running primitive if the primitive's precondition no longer holds."""
         end = self.seconds + self._seconds_of.get(step.behavior, 1.0)
         disturbed = False
@@ -67,7 +67,7 @@ class SymbolicWorld:
         after = None if behavior is None else successor(self.problem, behavior, step.arguments, self.state)
         if after is None:
             lost = "its precondition was lost in the meantime" if disturbed else "its precondition doesn't hold"
-            return Report(False, INTERRUPTED if disturbed else "not applicable", step.arguments, lost)
+            return WorldReport(False, INTERRUPTED if disturbed else "not applicable", step.arguments, lost)
         self.seconds = end
         fault = self._fault(step, self.state) if self._fault is not None else None
         if fault is not None:

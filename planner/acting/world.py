@@ -59,7 +59,7 @@ class Verdict(Protocol):
 
 
 @dataclass(frozen=True)
-class Report:
+class WorldReport:
     """A verdict as an immutable value. `facts` are the facts under which motion planning refuted the primitive."""
 
     ok: bool

@@ -26,7 +26,7 @@ from confab.planner.hierarchical.call import Call, Compiled
 from confab.planner.hierarchical.methods import Roles
 from confab.planner.plan import Limits, Outcome, paused_collection
 from confab.reasoner.amounts import meets
-from confab.reasoner.memory.experience import ITSELF, Counts, Experience, LearnedRule, Method, Order, Tally
+from confab.reasoner.memory.experience import ITSELF, Experience, LearnedOrder, LearnedRule, Method, Tallies, Tally
 from confab.reasoner.symbols import Problem
 
 
@@ -50,12 +50,12 @@ class Advisor:
         return rules_in(self.experience)
 
     @cached_property
-    def orders(self) -> list[Order]:
+    def orders(self) -> list[LearnedOrder]:
         """The orders of goals that held in nearly all observed cases."""
         return usable(self.experience)
 
     @cached_property
-    def totals(self) -> Counts:
+    def totals(self) -> Tallies:
         """The counts of all replicas of the memory, added up."""
         return self.experience.totals()
 

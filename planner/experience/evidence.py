@@ -20,16 +20,16 @@ from typing import TypeAlias
 from confab.planner.hierarchical.operators import Program
 from confab.planner.transitions import Cell, Table
 from confab.reasoner.language import walk
-from confab.reasoner.memory.experience import ITSELF, Experience, Fact, LearnedRule, Method, Tally
+from confab.reasoner.memory.experience import ITSELF, Experience, LearnedRule, Method, RoleFact, Tally
 from confab.reasoner.symbols import FALSE, ClassCondition, Problem, Witness
 
 DECAY = 0.9
 """Factor by which a preference decays with each later episode."""
 CROWD = 4
 """Maximum size of a class for which preferences for single individuals are counted."""
-Named: TypeAlias = "Mapping[str, str]"
+ByRole: TypeAlias = "Mapping[str, str]"
 """The individual of each role, by the name of the role."""
-Answer: TypeAlias = "Callable[[str, Named], str]"
+AnswerOf: TypeAlias = "Callable[[str, ByRole], str]"
 """Function that returns the answer to a question about an individual in a role."""
 
 
@@ -43,9 +43,9 @@ class FactReader:
         self.wanters: dict[tuple[str, str], list[Cell]] = {}
         for cell, value in goal.items():
             self.wanters.setdefault((cell[0], value), []).append(cell)
-        self._plans: dict[tuple[str, bool], list[tuple[int, str, Answer]]] = {}
+        self._plans: dict[tuple[str, bool], list[tuple[int, str, AnswerOf]]] = {}
 
-    def facts(self, rule: LearnedRule, roles: tuple[str, ...], among: Container[str] | None = None) -> list[Fact]:
+    def facts(self, rule: LearnedRule, roles: tuple[str, ...], among: Container[str] | None = None) -> list[RoleFact]:
         """Return the facts about the individuals in a rule's roles, optionally only the facts for given questions."""
         plan = self._plans.get((rule.name, among is None))
         if plan is None:
@@ -54,7 +54,7 @@ class FactReader:
         named = {individual: role for (role, _), individual in zip(rule.kinds, roles, strict=True)}
         return [(asks, answer(roles[i], named)) for i, asks, answer in plan]
 
-    def individuals(self, rule: LearnedRule, roles: tuple[str, ...]) -> list[Fact]:
+    def individuals(self, rule: LearnedRule, roles: tuple[str, ...]) -> list[RoleFact]:
         """Return the individual in each role of a rule, for the roles whose class has few members."""
         members = self.problem.members
         return [
@@ -63,7 +63,7 @@ class FactReader:
             if 1 < len(members(kind)) <= CROWD
         ]
 
-    def _questions(self, rule: LearnedRule) -> Iterator[tuple[int, str, Answer]]:
+    def _questions(self, rule: LearnedRule) -> Iterator[tuple[int, str, AnswerOf]]:
         members, situations = self.problem.members, self.problem.domain.situations.values()
         for i, (role, kind) in enumerate(rule.kinds):
             here, name = members(kind), role[1:]
@@ -84,40 +84,40 @@ class FactReader:
                         if j != i and any(a in here and b in members(of) for a, b in rows):
                             yield i, f"{name} {relation} {other[1:]}", partial(self._tied, rows, other)
 
-    def _belongs(self, among: Container[str], individual: str, _: Named) -> str:
+    def _belongs(self, among: Container[str], individual: str, _: ByRole) -> str:
         return "yes" if individual in among else "no"
 
-    def _value(self, situation: str, individual: str, named: Named) -> str:
+    def _value(self, situation: str, individual: str, named: ByRole) -> str:
         value = self.table.now[situation].get(individual, "none")
         return value if value == "none" or value in self.constants else named.get(value, "?another")[1:]
 
-    def _wanted(self, situation: str, individual: str, _: Named) -> str:
+    def _wanted(self, situation: str, individual: str, _: ByRole) -> str:
         wanted = self.goal.get((situation, individual))
         if wanted is None:
             return "nothing"
         return "as it is" if self.table.now[situation].get(individual, FALSE) == wanted else "not yet"
 
-    def _holders(self, situation: str, individual: str, named: Named) -> str:
+    def _holders(self, situation: str, individual: str, named: ByRole) -> str:
         keys = self.table.holders[situation].get(individual)
         if not keys:
             return "nobody"
         return next((role[1:] for one, role in named.items() if one in keys), "somebody")
 
-    def _wanting(self, situation: str, own: Container[str], individual: str, named: Named) -> str:
+    def _wanting(self, situation: str, own: Container[str], individual: str, named: ByRole) -> str:
         now, wanters = self.table.now[situation], self.wanters.get((situation, individual), ())
         others = (key for _, key in wanters if not isinstance(key, str) or named.get(key) not in own)
         return "somebody" if any(now.get(key, FALSE) != individual for key in others) else "nobody"
 
-    def _tied(self, rows: Container[tuple[str, ...]], other: str, individual: str, named: Named) -> str:
+    def _tied(self, rows: Container[tuple[str, ...]], other: str, individual: str, named: ByRole) -> str:
         return "yes" if any(role == other and (individual, end) in rows for end, role in named.items()) else "no"
 
 
-def fillers(method: Method, roles: Sequence[str | None], problem: Problem) -> list[Fact]:
+def fillers(method: Method, roles: Sequence[str | None], problem: Problem) -> list[RoleFact]:
     """Return the facts about each individual in an open role of a small class.
 
     One fact is about the individual alone. Each other fact is about the individual together with an individual of the step.
     """
-    found = list[Fact]()
+    found = list[RoleFact]()
     for role, individual in zip(method.open, roles[method.roles :], strict=True):
         if role.source is None and individual is not None and 1 < len(problem.members(role.kind)) <= CROWD:
             asks = f"who is {role.kind}"
@@ -132,7 +132,7 @@ def fillers(method: Method, roles: Sequence[str | None], problem: Problem) -> li
 class Factor:
     """One term of the sum that makes a behaviour's cogency: a fact, and the fact's weight as a logarithm of odds."""
 
-    fact: Fact
+    fact: RoleFact
     weight: float
 
 
@@ -142,10 +142,10 @@ class Scorer:
     def __init__(self, experience: Experience) -> None:
         self.totals = experience.totals()
         self.preferred = experience.preferences(DECAY)
-        self._weights: dict[str, dict[Fact, float]] = {}
+        self._weights: dict[str, dict[RoleFact, float]] = {}
         self._asked: dict[str, frozenset[str]] = {}
 
-    def weights(self, rule: LearnedRule | Method) -> Mapping[Fact, float]:
+    def weights(self, rule: LearnedRule | Method) -> Mapping[RoleFact, float]:
         """Return the contribution of each counted fact to the cogency of a rule, in ln odds.
 
         The contribution of the rule itself is always included.
@@ -167,7 +167,7 @@ class Scorer:
         return found
 
     def factors(
-        self, rule: LearnedRule | Method, facts: Iterable[Fact], individuals: Iterable[Fact] = ()
+        self, rule: LearnedRule | Method, facts: Iterable[RoleFact], individuals: Iterable[RoleFact] = ()
     ) -> Iterator[Factor]:
         """Yield the contributions to the cogency of following a rule in a situation with the given facts."""
         weights, liked = self.weights(rule), self.preferred.get(rule.name, {})
@@ -179,7 +179,7 @@ class Scorer:
             if c or p:
                 yield Factor(fact, log((c + 0.5) / (p + 0.5)))
 
-    def cogency(self, rule: LearnedRule | Method, facts: Iterable[Fact], individuals: Iterable[Fact]) -> float:
+    def cogency(self, rule: LearnedRule | Method, facts: Iterable[RoleFact], individuals: Iterable[RoleFact]) -> float:
         """Return the sum of the contributions to the cogency."""
         return sum(factor.weight for factor in self.factors(rule, facts, individuals))
 

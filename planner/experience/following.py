@@ -24,7 +24,7 @@ from confab.planner.hierarchical.refinement import RefinedStep
 from confab.planner.hierarchical.workspace import EXPANSION, Keep
 from confab.planner.transitions import Cell, arguments_of
 from confab.reasoner.amounts import meets, number
-from confab.reasoner.memory.experience import ITSELF, Experience, LearnedRule, Order, Tally
+from confab.reasoner.memory.experience import ITSELF, Experience, LearnedOrder, LearnedRule, Tally
 from confab.reasoner.symbols import FALSE, TRUE, Condition, Fact, Symbol, ValueCondition, Witness
 
 STEPS_PER_COST = 3
@@ -47,7 +47,7 @@ class RulePolicy:
     ----------
     call : Call
     rules : iterable of Rule
-    orders : sequence of Order
+    orders : sequence of LearnedOrder
     score : function of an instance, optional
         Of equally cheap instances, the one with the greatest score is tried first.
     joins : dict, optional
@@ -60,7 +60,7 @@ class RulePolicy:
         self,
         call: Call,
         rules: Iterable[LearnedRule],
-        orders: Sequence[Order] = (),
+        orders: Sequence[LearnedOrder] = (),
         score: Score | None = None,
         joins: dict[str, Bind | None] | None = None,
         ranked: Ranked = unranked,
@@ -326,7 +326,7 @@ class RulePolicy:
     def ordered(self, first: Condition, then: Condition, named: Mapping[str, str]) -> bool:
         """Return whether earlier plans achieved the condition `first` before the condition `then`."""
         one, other = fact(first, named), fact(then, named)
-        return one is not None and other is not None and Order.of(one, other, self.constants) in self.orders
+        return one is not None and other is not None and LearnedOrder.of(one, other, self.constants) in self.orders
 
     # --------------------------------------------------------------------------------------------------------- goals jointly
 
@@ -424,7 +424,7 @@ def rules_in(experience: Experience) -> list[LearnedRule]:
     return [one for name, one in said if isinstance(one, LearnedRule) and name not in experience.disabled]
 
 
-def usable(experience: Experience) -> list[Order]:
+def usable(experience: Experience) -> list[LearnedOrder]:
     """Return the orders of goals that nearly all plans had.
 
     Orders between goals without a common individual are returned only if the goals have different situation types.
@@ -432,7 +432,11 @@ def usable(experience: Experience) -> list[Order]:
     counts = experience.totals()
     found = []
     for name, order in sorted(experience.said.items()):
-        if isinstance(order, Order) and name not in experience.disabled and (order.shared or order.first != order.then):
+        if (
+            isinstance(order, LearnedOrder)
+            and name not in experience.disabled
+            and (order.shared or order.first != order.then)
+        ):
             so = counts.get(name, {}).get(ITSELF, Tally()).chosen
             other = counts.get(order.reversed.name, {}).get(ITSELF, Tally()).chosen
             if so >= CASES and so >= NEARLY * (so + other):
@@ -451,7 +455,7 @@ def fact(condition: Condition, named: Mapping[str, str]) -> Fact | None:
     return Fact(Symbol(condition.situation, arguments), named.get(condition.value, condition.value))
 
 
-def _before(goal: Mapping[Cell, str], orders: Iterable[Order], program: Program) -> dict[Cell, list[Cell]]:
+def _before(goal: Mapping[Cell, str], orders: Iterable[LearnedOrder], program: Program) -> dict[Cell, list[Cell]]:
     """Return, for each goal, the goals that the orders place before this goal."""
     found: dict[Cell, list[Cell]] = {}
     parts = {cell: (*arguments_of(cell[1]), value) for cell, value in goal.items()}
@@ -465,6 +469,6 @@ def _before(goal: Mapping[Cell, str], orders: Iterable[Order], program: Program)
         for cell, terms in parts.items():
             if cell[0] == order.then:
                 for other in index.get(tuple(terms[j] for _, j in order.shared), ()):
-                    if other != cell and Order.of(facts[other], facts[cell], constants) == order:
+                    if other != cell and LearnedOrder.of(facts[other], facts[cell], constants) == order:
                         found.setdefault(cell, []).append(other)
     return found

@@ -27,13 +27,13 @@ from confab.reasoner.limits import LimitError, check
 from confab.reasoner.memory.experience import (
     ITSELF,
     Experience,
-    Fact,
     GoalKind,
     Ground,
     LearnedRule,
     LearningError,
     Lesson,
     Method,
+    RoleFact,
     Tally,
 )
 from confab.reasoner.symbols import Problem, Symbol
@@ -251,7 +251,7 @@ def refined(call: Call, steps: Iterable[Step]) -> Lesson:
     return lesson
 
 
-def taken(call: Call, method: Method, roles: Roles) -> Iterator[tuple[Method, Fact, Tally]]:
+def taken(call: Call, method: Method, roles: Roles) -> Iterator[tuple[Method, RoleFact, Tally]]:
     """Yield the individuals in the open roles of a method as chosen; yield other possible individuals as passed over.
 
     Another individual is possible if the steps of the method are applicable with this individual.
@@ -344,7 +344,7 @@ def chosen(
     return lesson
 
 
-def counts_of(reader: FactReader, c: RuleInstance, tally: Tally) -> Iterator[tuple[LearnedRule, Fact, Tally]]:
+def counts_of(reader: FactReader, c: RuleInstance, tally: Tally) -> Iterator[tuple[LearnedRule, RoleFact, Tally]]:
     """Yield a tally for the rule of an instance, and for each fact about the individuals in the rule's roles."""
     return ((c.rule, fact, tally) for fact in (ITSELF, *reader.facts(c.rule, c.roles)))
 

@@ -19,12 +19,12 @@ from dataclasses import dataclass, replace
 from itertools import permutations
 
 from confab.planner.hierarchical.operators import named
-from confab.planner.validation import BehaviorReader, Facts
+from confab.planner.validation import BehaviorReader, LoggedState
 from confab.reasoner.amounts import Amount, inside, meets, towards
 from confab.reasoner.derivation import strata
 from confab.reasoner.language import terms, walk
 from confab.reasoner.limits import check
-from confab.reasoner.memory.experience import Ground, LearnedRule, LearningError, Order
+from confab.reasoner.memory.experience import Ground, LearnedOrder, LearnedRule, LearningError
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -49,7 +49,7 @@ BINDINGS = 100
 
 
 @dataclass(frozen=True)
-class Done:
+class ExecutedStep:
     """An executed step: the ground preconditions, and the changes, each with the conditions of the effect."""
 
     ground: Ground
@@ -68,11 +68,11 @@ class PlanTrace:
     """
 
     def __init__(self, problem: Problem, steps: Sequence[Ground]) -> None:
-        self.problem, self.rules, self.facts = problem, BehaviorReader(problem), Facts(problem, problem.initial)
+        self.problem, self.rules, self.facts = problem, BehaviorReader(problem), LoggedState(problem, problem.initial)
         self.constants = frozenset(named(problem)) | {TRUE, FALSE}
         self.written = frozenset(named(problem, rests=False)) | {TRUE, FALSE}
         """The individuals that behaviours name; all other individuals, including rest values, become roles."""
-        self.done: list[Done] = []
+        self.done: list[ExecutedStep] = []
         self.achieved: dict[Fact, int] = {}
         for number, (name, arguments) in enumerate(steps):
             self._do(number, name, arguments)
@@ -102,7 +102,7 @@ class PlanTrace:
                 f"step {number} ({' '.join((name, *arguments))}): an amount would take a value that isn't allowed"
             )
         changes = [(situation, key, value, tuple(because.get((situation, key), ()))) for situation, key, value in made]
-        self.done.append(Done((name, arguments), (*kinds, *asked), tuple(changes), len(facts.log)))
+        self.done.append(ExecutedStep((name, arguments), (*kinds, *asked), tuple(changes), len(facts.log)))
         goals = self.problem.goal
         before = {s for s, value in goals.items() if meets(facts.value(s.situation, s.arguments), value)}
         for situation, key, value, _ in changes:
@@ -112,7 +112,7 @@ class PlanTrace:
                 self.achieved[Fact(symbol, value)] = number
 
     def plain(
-        self, conditions: Sequence[Condition], bound: Mapping[str, str], kinds: Mapping[str, str], facts: Facts
+        self, conditions: Sequence[Condition], bound: Mapping[str, str], kinds: Mapping[str, str], facts: LoggedState
     ) -> Iterator[Condition]:
         """Yield ground conditions without quantifiers and alternatives.
 
@@ -137,7 +137,7 @@ class PlanTrace:
             else:
                 yield condition
 
-    def because(self, condition: ValueCondition, facts: Facts) -> Iterator[list[Condition]]:
+    def because(self, condition: ValueCondition, facts: LoggedState) -> Iterator[list[Condition]]:
         """Yield the derivations of a defined situation in a state; each derivation is a list of conditions."""
         rules = self.problem.domain.rules
         of = [(rule.conditions, rule.behavior.kinds, rule.parameters) for rule in rules[condition.situation]]
@@ -163,7 +163,7 @@ class PlanTrace:
 
         After the last rule, the facts of the trace are those of the initial state.
         """
-        later, facts = self.facts, Facts(self.problem, self.problem.initial)
+        later, facts = self.facts, LoggedState(self.problem, self.problem.initial)
         for done in self.done:
             for situation, key, value, _ in done.changes:
                 facts.put(situation, key, value)
@@ -183,7 +183,7 @@ class PlanTrace:
             undo(later, done.mark)
 
     def needed(
-        self, after: Iterable[Condition], done: Done, facts: Facts, later: Facts
+        self, after: Iterable[Condition], done: ExecutedStep, facts: LoggedState, later: LoggedState
     ) -> tuple[dict[Condition, None], dict[Condition, None]]:
         """Return the conditions needed before a step, and the conditions that the step achieves.
 
@@ -231,7 +231,13 @@ class PlanTrace:
                 need.update(dict.fromkeys(self.before(c, done)))
         return need, achieved
 
-    def links(self, done: Done, achieved: Iterable[Condition], facts: Facts, later: Facts) -> Iterator[LearnedRule]:
+    def links(
+        self,
+        done: ExecutedStep,
+        achieved: Iterable[Condition],
+        facts: LoggedState,
+        later: LoggedState,
+    ) -> Iterator[LearnedRule]:
         """Yield the rule for each needed change of a step; the change is the rule's goal."""
         goals: dict[ValueCondition, None] = {}
         for c in achieved:
@@ -253,7 +259,7 @@ class PlanTrace:
                 if rule is not None:
                     yield rule
 
-    def aimed(self, goal: ValueCondition, facts: Facts) -> ValueCondition:
+    def aimed(self, goal: ValueCondition, facts: LoggedState) -> ValueCondition:
         """Return the goal of a rule; for an amount, replace the value by the direction of the change.
 
         Equal amounts seldom occur in other problems.
@@ -262,7 +268,7 @@ class PlanTrace:
             return goal
         return replace(goal, value=towards(facts.value(goal.situation, goal.arguments), goal.value))
 
-    def before(self, condition: Condition, done: Done) -> Iterator[Condition]:
+    def before(self, condition: Condition, done: ExecutedStep) -> Iterator[Condition]:
         """Yield the conditions of those effects of a step that contribute to a given condition."""
         about = {(c.situation, c.arguments) for c in walk(condition) if isinstance(c, ValueCondition)}
         situations = {situation for situation, _ in about}
@@ -271,7 +277,9 @@ class PlanTrace:
             if when and ((situation, key) in about if plain else situation in situations):
                 yield from when
 
-    def hindered(self, achieved: Iterable[Condition], facts: Facts) -> Iterator[tuple[list[Condition], Condition]]:
+    def hindered(
+        self, achieved: Iterable[Condition], facts: LoggedState
+    ) -> Iterator[tuple[list[Condition], Condition]]:
         """For each achieved "no object …" condition that exactly one individual violated, yield two results.
 
         The first result contains the conditions that the individual satisfied before the step. The second result is the
@@ -367,11 +375,11 @@ class PlanTrace:
 
     # ------------------------------------------------------------------------------------------------------------ order
 
-    def orders(self) -> Iterator[Order]:
+    def orders(self) -> Iterator[LearnedOrder]:
         """For every two goals that different steps achieved, yield the order in which they were achieved."""
         for first, then in permutations(self.achieved, 2):
             if self.achieved[first] < self.achieved[then]:
-                yield Order.of(first, then, self.constants)
+                yield LearnedOrder.of(first, then, self.constants)
 
 
 def opened(conditions: Iterable[Condition], kinds: Mapping[str, str]) -> tuple[tuple[Condition, ...], dict[str, str]]:
@@ -405,7 +413,7 @@ def asked(condition: Condition) -> Iterator[ValueCondition | Amount]:
             yield from (i for e in (inner.left, inner.right) for i in inside(e) if isinstance(i, Amount))
 
 
-def undo(facts: Facts, mark: int) -> None:
+def undo(facts: LoggedState, mark: int) -> None:
     """Undo the changes that were made after the log had the length `mark`."""
     while len(facts.log) > mark:
         situation, key, old = facts.log[-1]

@@ -35,7 +35,7 @@ from confab.reasoner.amounts import (
 from confab.reasoner.symbols import Fact, Problem, State, Symbol
 
 Exact: TypeAlias = "int | Fraction"
-Vector: TypeAlias = "tuple[Exact, ...]"
+AmountVector: TypeAlias = "tuple[Exact, ...]"
 Push: TypeAlias = "Exact | None"
 """The change of a comparison's difference by an operator, or None if the change depends on the state."""
 
@@ -47,14 +47,14 @@ class Linear:
     terms: tuple[tuple[int, Exact], ...]
     constant: Exact
 
-    def of(self, vector: Vector) -> Exact:
+    def of(self, vector: AmountVector) -> Exact:
         """Return the value of the expression for a tuple of amounts."""
         total = self.constant
         for place, factor in self.terms:
             total += vector[place] * factor
         return total
 
-    def worth(self, vector: Vector) -> float:
+    def worth(self, vector: AmountVector) -> float:
         """Return the value of the expression as a floating-point number."""
         return float(self.of(vector))
 
@@ -236,13 +236,13 @@ class Amounts:
     """
 
     symbols: Sequence[Symbol]
-    first: Vector
+    first: AmountVector
     quantities: Sequence[Quantity]
     bits: Mapping[tuple[Linear, str], int]
     size: int
     moves: Callable[[int], tuple[Move, ...]]
-    vectors: list[Vector] = field(default_factory=list)
-    _number: dict[Vector, int] = field(default_factory=dict, repr=False)
+    vectors: list[AmountVector] = field(default_factory=list)
+    _number: dict[AmountVector, int] = field(default_factory=dict, repr=False)
     _masks: list[int] = field(default_factory=list, repr=False)
     _moves: dict[int, tuple[Move, ...]] = field(default_factory=dict, repr=False)
 
@@ -261,7 +261,7 @@ class Amounts:
                 found[place].append((bit, difference, sign))
         return found
 
-    def numbered(self, vector: Vector, mask: int, changed: Iterable[int]) -> int:
+    def numbered(self, vector: AmountVector, mask: int, changed: Iterable[int]) -> int:
         """Return the number of a tuple.
 
         A new tuple receives the next number. The comparison bits of a new tuple are derived from `mask`, the bits of another
@@ -279,7 +279,7 @@ class Amounts:
             self._masks.append(mask)
         return number
 
-    def vector(self, state: int) -> Vector:
+    def vector(self, state: int) -> AmountVector:
         """Return the tuple of amounts of a state."""
         return self.vectors[state >> self.size]
 

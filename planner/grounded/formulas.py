@@ -65,7 +65,7 @@ class ReachableFacts(Protocol):
 
 
 @dataclass(frozen=True)
-class _Part:
+class _Component:
     """Conditions that are connected by shared free variables.
 
     `unbound` are the free variables, `bound` are the variables bound outside, and `kinds` are the classes of all variables.
@@ -93,7 +93,7 @@ class Formulas:
         self._groups: dict[int, tuple[tuple[int, ...], ...]] = {}  # alternatives of disjunctions, by bit
         self.asked = 0
         self._known: dict[tuple[int, bool, tuple[str, ...]], Literals] = {}  # formulas by part and individuals
-        self._parts_of: dict[tuple[int, frozenset[str]], tuple[Condition, list[list[_Part]]]] = {}
+        self._parts_of: dict[tuple[int, frozenset[str]], tuple[Condition, list[list[_Component]]]] = {}
         self._relations: dict[tuple[str, int, int, tuple[int, ...]], dict[tuple[str, ...], dict[str, None]]] = {}
         self._members: dict[str, dict[str, None]] = {}
         self._names = count()
@@ -137,7 +137,7 @@ class Formulas:
             return self.all_of(self.any_of(self._part(part, terms, True) for part in group) for group in groups)
         return self.any_of(self.all_of(self._part(part, terms) for part in group) for group in groups)
 
-    def _part(self, part: _Part, terms: Mapping[str, str], negated: bool = False) -> Literals:
+    def _part(self, part: _Component, terms: Mapping[str, str], negated: bool = False) -> Literals:
         """Return the formula for "some individuals satisfy all conditions of a part"; if `negated`, return the negation."""
         bound = {name: terms[name] for name in part.bound}
         key = id(part), negated, tuple(bound.values())
@@ -151,7 +151,7 @@ class Formulas:
 
     def _groups_of(
         self, condition: Witness | AnyOf, bound: frozenset[str], kinds: Mapping[str, str]
-    ) -> list[list[_Part]]:
+    ) -> list[list[_Component]]:
         """Return the groups of a condition, each split into parts that share no free variable."""
         key = id(condition), bound
         if key not in self._parts_of:
@@ -161,7 +161,9 @@ class Formulas:
             self._parts_of[key] = condition, [list(self._parts(group, bound, kinds)) for group in groups]
         return self._parts_of[key][1]
 
-    def _parts(self, group: Sequence[Condition], bound: frozenset[str], kinds: Mapping[str, str]) -> Iterator[_Part]:
+    def _parts(
+        self, group: Sequence[Condition], bound: frozenset[str], kinds: Mapping[str, str]
+    ) -> Iterator[_Component]:
         """Yield the parts of a group of conditions.
 
         For example, "a cup is clean and a hand is empty" has one part about the cup and one part about the hand.
@@ -179,7 +181,7 @@ class Formulas:
                 of_part += more
                 conditions = [c for c in conditions if c not in more]
             outside = {name for c in of_part for name in mentions(c)} & bound
-            yield _Part(tuple(of_part), tuple(sorted(names)), tuple(sorted(outside)), kinds)
+            yield _Component(tuple(of_part), tuple(sorted(names)), tuple(sorted(outside)), kinds)
 
     def _opened(
         self, group: Sequence[Condition], shared: set[str] | frozenset[str], kinds: dict[str, str]
@@ -198,7 +200,9 @@ class Formulas:
             inner = [substituted(one, names) for one in c.conditions]
             yield from self._opened(inner, shared | set(names.values()), kinds)
 
-    def _solutions(self, part: _Part, unbound: Sequence[str], terms: Mapping[str, str]) -> Iterator[Mapping[str, str]]:
+    def _solutions(
+        self, part: _Component, unbound: Sequence[str], terms: Mapping[str, str]
+    ) -> Iterator[Mapping[str, str]]:
         """Yield the bindings of a part's free variables that the reachable facts and the relations allow."""
         if not unbound:
             yield terms
@@ -210,7 +214,7 @@ class Formulas:
         for value in values:
             yield from self._solutions(part, rest, {**terms, name: value})
 
-    def _candidates(self, name: str, part: _Part, terms: Mapping[str, str]) -> Sequence[str]:
+    def _candidates(self, name: str, part: _Component, terms: Mapping[str, str]) -> Sequence[str]:
         """Return the individuals that a positive condition of a part allows for a variable.
 
         Without a suitable condition, return all individuals of the variable's class.

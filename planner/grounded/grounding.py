@@ -86,11 +86,11 @@ def ground(
     for symbol, value in sorted(wanted.items()):
         if not reached.possible(symbol, value):
             return Reason(f"{Fact(symbol, value)} can't be reached")
-    task = _Assembly(reached).task(wanted)
+    task = _TaskBuilder(reached).task(wanted)
     return task if isinstance(task, Reason) else shortage(task) or task
 
 
-class _Assembly:
+class _TaskBuilder:
     """Assembly of the operators and bits of a task from the reachable facts."""
 
     def __init__(self, reached: Reached) -> None:

@@ -19,7 +19,7 @@ from collections import defaultdict
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, TypeAlias
 
-from confab.planner.grounded.amounts import Exact, Linear, Vector, pushes
+from confab.planner.grounded.amounts import AmountVector, Exact, Linear, pushes
 from confab.planner.grounded.task import Task, bits_of
 
 MOST_TIMES = 1000
@@ -145,7 +145,7 @@ def cost_left(task: Task) -> Callable[[int], float]:
     needed_by = _needed_by(needs, task.size)
     low, goal = (1 << task.size) - 1, bits_of(task.goal)
 
-    def priced(vector: Vector) -> list[float]:
+    def priced(vector: AmountVector) -> list[float]:
         """Return the cost of each operator with its repetitions.
 
         The cost is infinite if the operator can't make its comparison true.

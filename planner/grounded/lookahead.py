@@ -16,11 +16,11 @@ from confab.planner.grounded.task import Task, bits_of
 
 ENABLING = 8
 """Maximum number of missing bits for which the lookahead tries to insert an operator."""
-Path: TypeAlias = "tuple[int, list[int]]"
+StatePath: TypeAlias = "tuple[int, list[int]]"
 """A state, and the operators on the path to this state."""
 
 
-def ahead(task: Task, deadline: float | None = None) -> Callable[[int, Sequence[int]], Path]:
+def ahead(task: Task, deadline: float | None = None) -> Callable[[int, Sequence[int]], StatePath]:
     """Return a function that executes a relaxed plan from a state as far as possible.
 
     The function returns the final state and the executed operators. If no operator of the plan is applicable, the function
@@ -93,7 +93,7 @@ def ahead(task: Task, deadline: float | None = None) -> Callable[[int, Sequence[
                 best = rank, after, other
         return None if best is None else (best[1], best[2], stuck)
 
-    def carried_out(state: int, relaxed_plan: Sequence[int]) -> Path:
+    def carried_out(state: int, relaxed_plan: Sequence[int]) -> StatePath:
         path: list[int] = []
         left = list(relaxed_plan)
         while True:

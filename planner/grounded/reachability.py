@@ -16,7 +16,7 @@ from confab.planner.grounded.amounts import AmountTable
 from confab.planner.grounded.formulas import Formulas
 from confab.planner.grounded.joins import Ints, JoinTable, pack
 from confab.planner.grounded.merged_effects import lifted
-from confab.planner.grounded.schemas import Atom, Schema, rules_apart, schemas
+from confab.planner.grounded.schemas import Schema, TablePattern, rules_apart, schemas
 from confab.planner.grounded.separation import in_parts
 from confab.reasoner.language import mentions
 from confab.reasoner.limits import OutOfTimeError, check
@@ -248,13 +248,13 @@ class Reached:
                     break
         return best
 
-    def _fan_out(self, atom: Atom, columns: Mapping[str, Ints]) -> float:
+    def _fan_out(self, atom: TablePattern, columns: Mapping[str, Ints]) -> float:
         """Estimate how many rows of the atom's table match one row of `columns`."""
         free = len({t for t in atom.terms if t.startswith("?")} - columns.keys())
         return float(max(len(self.tables[atom.table]), 1) ** (free / max(len(atom.terms), 1)) - (not free))
 
     def _step(
-        self, atom: Atom, columns: dict[str, Ints], count: int, limits: tuple[int, int] | None
+        self, atom: TablePattern, columns: dict[str, Ints], count: int, limits: tuple[int, int] | None
     ) -> tuple[dict[str, Ints], int]:
         """Join `columns` with an atom; return the joined columns and the number of their rows."""
         table = self.tables[atom.table]

@@ -36,7 +36,7 @@ from confab.reasoner.symbols import (
 
 
 @dataclass(frozen=True)
-class Atom:
+class TablePattern:
     """A condition that the rows of a table match; the table belongs to a situation type, a relation or a class.
 
     For a situation type that isn't boolean, `terms` are the arguments and the value.
@@ -57,7 +57,7 @@ class Schema:
 
     behavior: Behavior
     terms: tuple[str, ...]
-    atoms: tuple[Atom, ...]
+    atoms: tuple[TablePattern, ...]
     filters: tuple[Condition, ...]
     residue: tuple[Condition, ...]
     kinds: Mapping[str, str]
@@ -191,7 +191,7 @@ class _Compiler:
         others = [part for part in parts if not list(self._atom(part))]
         parameters = [parameter.name for parameter in behavior.parameters]
         bound = dict.fromkeys([*first, *parameters, *(t for atom in atoms for t in atom.terms if is_variable(t))])
-        atoms += [Atom(("class", kinds[name]), (name,)) for name in bound]
+        atoms += [TablePattern(("class", kinds[name]), (name,)) for name in bound]
         filters = [part for part in others if not self._fluent(part)]
         residue = [part for part in others if self._fluent(part)]
         for part in others:
@@ -269,15 +269,15 @@ class _Compiler:
         else:
             yield true
 
-    def _atom(self, condition: Condition) -> Iterator[Atom]:
+    def _atom(self, condition: Condition) -> Iterator[TablePattern]:
         match condition:
             case ValueCondition(situation, arguments, value, False):
                 row = arguments if self.situations[situation].boolean else (*arguments, value)
-                yield Atom(("situation", situation), row, situation in self.changed)
+                yield TablePattern(("situation", situation), row, situation in self.changed)
             case RelationCondition(relation, arguments, False):
-                yield Atom(("relation", relation), arguments)
+                yield TablePattern(("relation", relation), arguments)
             case ClassCondition(term, kind, False):
-                yield Atom(("class", kind), (term,))
+                yield TablePattern(("class", kind), (term,))
             case _:  # other conditions are evaluated row by row
                 pass
 

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from confab.planner.grounded.schemas import Atom, Schema
+from confab.planner.grounded.schemas import Schema, TablePattern
 from confab.reasoner.amounts import terms_of
 from confab.reasoner.language import is_variable, mentions, walk
 from confab.reasoner.symbols import TRUE, Comparison, Condition, SituationType, ValueEffect
@@ -57,13 +57,13 @@ def in_parts(schema: Schema, members: Members) -> tuple[list[Schema], dict[str, 
                 own,
                 behavior=replace(schema.behavior, name=name, preconditions=(), effects=(effect,), amounts=()),
                 terms=(*beside, variable),
-                atoms=(*own.atoms, *(Atom(("class", schema.kinds[term]), (term,)) for term in beside)),
+                atoms=(*own.atoms, *(TablePattern(("class", schema.kinds[term]), (term,)) for term in beside)),
                 effects=((0, effect),),
                 amounts=(),
                 rule=True,
             )
         )
-        schema = replace(rest, terms=left, atoms=(Atom(("situation", name), beside, True), *rest.atoms))
+        schema = replace(rest, terms=left, atoms=(TablePattern(("situation", name), beside, True), *rest.atoms))
     return [schema, *rules], made
 
 
@@ -85,13 +85,15 @@ def _separable(
         own = [part for part in (*schema.atoms, *schema.filters, *schema.residue) if variable in _names(part)]
         beside = tuple(sorted(set().union(*map(_names, own)) & every - {variable}))
         left = tuple(dict.fromkeys(term for term in (*schema.terms, *beside) if term != variable))
-        changing = any(part.fluent if isinstance(part, Atom) else part in schema.residue for part in own)
-        compares = any(isinstance(c, Comparison) for part in own if not isinstance(part, Atom) for c in walk(part))
+        changing = any(part.fluent if isinstance(part, TablePattern) else part in schema.residue for part in own)
+        compares = any(
+            isinstance(c, Comparison) for part in own if not isinstance(part, TablePattern) for c in walk(part)
+        )
         fewer = rows(left) + rows((*beside, variable))
         if changing and not compares and fewer < rows(schema.terms):
             found.append((fewer, variable, beside, left))
     return min(found, default=None)
 
 
-def _names(part: Atom | Condition) -> set[str]:
-    return {*part.terms} if isinstance(part, Atom) else set(mentions(part))
+def _names(part: TablePattern | Condition) -> set[str]:
+    return {*part.terms} if isinstance(part, TablePattern) else set(mentions(part))

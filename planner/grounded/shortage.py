@@ -17,7 +17,7 @@ from fractions import Fraction
 from functools import cached_property, reduce
 from operator import or_
 
-from confab.planner.grounded.amounts import Amounts, Exact, Move, Vector
+from confab.planner.grounded.amounts import Amounts, AmountVector, Exact, Move
 from confab.planner.grounded.task import Task, bits_of
 from confab.planner.plan import Reason
 from confab.reasoner.amounts import written
@@ -51,7 +51,7 @@ class _Sums:
 
     task: Task
     amounts: Amounts
-    vector: Vector
+    vector: AmountVector
     moves: Mapping[int, Sequence[Move]]
 
     def short(self) -> Reason | None:
@@ -209,7 +209,7 @@ class _Sums:
 
 
 def _extent(
-    amounts: Amounts, place: int, vector: Vector, moves: Mapping[int, Sequence[Move]]
+    amounts: Amounts, place: int, vector: AmountVector, moves: Mapping[int, Sequence[Move]]
 ) -> tuple[Fraction | None, Fraction | None]:
     """Return the minimum and the maximum that operators can give to an amount, with None for no limit."""
     low: Fraction | None = Fraction(vector[place])

@@ -24,7 +24,7 @@ from confab.planner.grounded.exploring import Candidate, OpenList, explore, path
 from confab.planner.grounded.task import Task, bits_of
 from confab.planner.plan import Counts
 
-Bound: TypeAlias = "Callable[[int], float]"
+LowerBound: TypeAlias = "Callable[[int], float]"
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Cheapest:
     """
 
     def __init__(
-        self, task: Task, bound: Bound, upper: float, counts: Counts, weight: int = 1, cut: float = 1.0
+        self, task: Task, bound: LowerBound, upper: float, counts: Counts, weight: int = 1, cut: float = 1.0
     ) -> None:
         self.task, self.bound, self.upper, self.weight, self.cut, self.counts = task, bound, upper, weight, cut, counts
         self.reached: dict[int, Candidate] = {}
@@ -92,7 +92,7 @@ class Cheapest:
 
 def shortest(
     task: Task,
-    bound: Bound = nothing,
+    bound: LowerBound = nothing,
     upper: float = math.inf,
     most: int = 1_000_000,
     deadline: float | None = None,
@@ -134,7 +134,7 @@ def shortest(
     return Shortest(order.upper if lower is None else lower, plan, order.reached)
 
 
-def ways(task: Task) -> Bound:
+def ways(task: Task) -> LowerBound:
     """Return a lower bound on the cost of a plan: the sum, over all goals, of the least cost of achieving the goal alone.
 
     Each operator counts for only one symbol. Therefore no plan is cheaper than the bound.

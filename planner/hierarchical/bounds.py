@@ -19,7 +19,7 @@ from dataclasses import replace
 from time import perf_counter
 
 from confab.planner.grounded.grounding import ground
-from confab.planner.grounded.shortest import Bound, shortest, ways
+from confab.planner.grounded.shortest import LowerBound, shortest, ways
 from confab.planner.grounded.task import Task
 from confab.planner.hierarchical.planner import SEARCHING, Compiled, compiled
 from confab.planner.hierarchical.planner import plan as hierarchical_plan
@@ -109,7 +109,7 @@ def _proved(problem: Problem, best: Outcome, limits: Limits, deadline: float | N
     return lower, None
 
 
-def lm_cut(task: Task, deadline: float | None = None) -> Bound:
+def lm_cut(task: Task, deadline: float | None = None) -> LowerBound:
     """Return the LM-cut heuristic of a task as a function of a state.
 
     After the deadline, the heuristic is the cost of the cuts found so far; this cost is also a lower bound. The computation

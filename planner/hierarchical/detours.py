@@ -18,7 +18,7 @@ AGAIN = 30
 
 
 @dataclass(eq=False)
-class _Done:
+class _AppliedStep:
     """An applied step with its position, its changes, and the mark of the table's trail before the step."""
 
     number: int
@@ -52,7 +52,7 @@ def without_detours(refiner: Refiner, steps: Sequence[RefinedStep], level: int) 
     table.undo(0)
     if len(fewer) == len(kept):
         return list(steps)
-    found = _Assembly(refiner, level, fewer).of(steps)
+    found = _Reassembly(refiner, level, fewer).of(steps)
     table.undo(0)
     return found
 
@@ -68,20 +68,20 @@ def parts(step: RefinedStep, level: int) -> Iterator[RefinedStep]:
 
 def _without_cycles(
     refiner: Refiner, steps: Mapping[int, RefinedStep], owners: Sequence[int], left: int
-) -> tuple[list[_Done], int]:
+) -> tuple[list[_AppliedStep], int]:
     """Apply the steps that can't be removed; return these steps and the remaining number of replays.
 
     A detour within a single step of the plan stays; `owners` contains the step of the plan for each position. At most `left` steps
     are replayed.
     """
     table = refiner.table
-    done: list[_Done] = []
-    latest: dict[Cell, list[_Done]] = {}
+    done: list[_AppliedStep] = []
+    latest: dict[Cell, list[_AppliedStep]] = {}
     for number, step in steps.items():
         refiner.space.check_time()
         mark = len(table.trail)
         refiner.replay_checked(step)
-        one = _Done(number, step, table.changes(mark), mark)
+        one = _AppliedStep(number, step, table.changes(mark), mark)
         done.append(one)
         for cell in one.changes[0]:
             latest.setdefault(cell, []).append(one)
@@ -94,7 +94,7 @@ def _without_cycles(
     return done, left
 
 
-def _circle(last: _Done, latest: Mapping[Cell, list[_Done]]) -> list[_Done]:
+def _circle(last: _AppliedStep, latest: Mapping[Cell, list[_AppliedStep]]) -> list[_AppliedStep]:
     """Return the latest steps that all change the same symbols as `last` and together restore the old values.
 
     The result ends with `last`; it is empty if there are no such steps.
@@ -110,7 +110,7 @@ def _circle(last: _Done, latest: Mapping[Cell, list[_Done]]) -> list[_Done]:
     return []
 
 
-def _removed(refiner: Refiner, done: list[_Done], circle: Sequence[_Done]) -> bool:
+def _removed(refiner: Refiner, done: list[_AppliedStep], circle: Sequence[_AppliedStep]) -> bool:
     """Remove the steps of `circle` if the steps between them still lead to the same state; return whether that succeeded."""
     table, mark = refiner.table, circle[0].mark
     first = next(i for i in reversed(range(len(done))) if done[i] is circle[0])
@@ -135,7 +135,7 @@ def _removed(refiner: Refiner, done: list[_Done], circle: Sequence[_Done]) -> bo
     return False
 
 
-class _Assembly:
+class _Reassembly:
     """Assembly of steps from their remaining parts; each part is replayed on the table.
 
     A step is kept if three conditions hold: all of its parts remain, the step still has its effect, and all symbols that the step's

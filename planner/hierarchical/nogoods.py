@@ -15,9 +15,9 @@ from confab.planner.hierarchical.workspace import Keep, Workspace
 from confab.planner.transitions import Cell, arguments_of, key_of
 from confab.reasoner.symbols import State
 
-Term: TypeAlias = "str | int"
+RoleTerm: TypeAlias = "str | int"
 """An individual, or the number of a role."""
-Held: TypeAlias = "tuple[str, tuple[Term, ...], Term, Term | None]"
+Held: TypeAlias = "tuple[str, tuple[RoleTerm, ...], RoleTerm, RoleTerm | None]"
 """A situation type, its arguments, the value at the time of the failed search, and the required final value.
 
 The required final value is None if any value is allowed.
@@ -39,7 +39,7 @@ class Nogoods:
             return False
         now, names = self.space.table.now, list(roles)
 
-        def named(term: Term | None) -> str | None:
+        def named(term: RoleTerm | None) -> str | None:
             return names[term] if isinstance(term, int) else term
 
         def holds(held: Held) -> bool:
@@ -54,7 +54,7 @@ class Nogoods:
         """Record that the search for targets with a budget failed in a scope with the state `around`."""
         roles = individuals(targets)
 
-        def lifted(term: str) -> Term:
+        def lifted(term: str) -> RoleTerm:
             return roles.get(term, term)
 
         held: list[Held] = []

@@ -73,7 +73,7 @@ class Achiever:
     deep: bool = False
 
 
-class Block:
+class CodeBlock:
     """Lines of Python code; each opened line indents the lines that follow."""
 
     def __init__(self) -> None:
@@ -196,7 +196,7 @@ class Program:
         name = f"{identifier('achieve', behavior.name)}_{number}"
         inputs = [f"i{i}" for i in range(len(effect.arguments) + 1)]
         waiting = [*effect.when, *behavior.preconditions, *allowed(behavior, self.domain.situations)]
-        block = Block()
+        block = CodeBlock()
         bound = self._enumerated(behavior, effect, inputs, waiting, block)
         block.add("unmet = ()")
         soft, determined = self._tested(behavior, waiting, bound, block)
@@ -212,7 +212,7 @@ class Program:
         self.achievers.setdefault((behavior.level, effect.situation), []).append(achiever)
 
     def _enumerated(
-        self, behavior: Behavior, effect: AnyEffect, inputs: Sequence[str], waiting: list[Condition], block: Block
+        self, behavior: Behavior, effect: AnyEffect, inputs: Sequence[str], waiting: list[Condition], block: CodeBlock
     ) -> set[str]:
         """Write loops over the candidates of unbound parameters, with tests on bound terms; return the bound terms.
 
@@ -247,7 +247,7 @@ class Program:
             tests = [self.writer.member(term, behavior.kinds[term])]
 
     def _tested(
-        self, behavior: Behavior, waiting: Sequence[Condition], bound: set[str], block: Block
+        self, behavior: Behavior, waiting: Sequence[Condition], bound: set[str], block: CodeBlock
     ) -> tuple[list[Condition], Determined]:
         """Write tests that add the unmet conditions to `unmet`; bind the variables that the state determines.
 

@@ -26,9 +26,9 @@ from confab.planner.transitions import Cell, arguments_of
 from confab.reasoner.limits import LimitError
 from confab.reasoner.symbols import FALSE, Behavior, Problem, ValueEffect
 
-Run: TypeAlias = "tuple[int, int]"
+StepRange: TypeAlias = "tuple[int, int]"
 """The steps between two positions; position n is the position after n steps."""
-View: TypeAlias = "tuple[str, ...]"
+LevelView: TypeAlias = "tuple[str, ...]"
 """The values of the changed symbols as a level sees them; a value that the level doesn't see is replaced by an empty text."""
 
 LONGEST = 60
@@ -82,7 +82,7 @@ def grouped(views: _Views) -> list[Step]:
     return [node(views, run, groups[run]) if run in groups else views.steps[run[0]] for run in division]
 
 
-def node(views: _Views, run: Run, above: Sequence[Ground]) -> Step:
+def node(views: _Views, run: StepRange, above: Sequence[Ground]) -> Step:
     """Return the upper-level step, or the upper-level steps that are refined together, with the steps of a run as sub-steps."""
     call = views.call
     views.enter(run[0])
@@ -96,7 +96,7 @@ def node(views: _Views, run: Run, above: Sequence[Ground]) -> Step:
     return replace(made[0], steps=tuple(views.steps[slice(*run)]), joined=tuple(made[1:]))
 
 
-def best_division(groups: Mapping[Run, Collection[Ground]], length: int) -> list[Run]:
+def best_division(groups: Mapping[StepRange, Collection[Ground]], length: int) -> list[StepRange]:
     """Return a division of steps into the runs of groups, and runs of one ungrouped step.
 
     The division has as few ungrouped steps as possible; among such divisions, it has the fewest upper-level steps, and then the
@@ -114,7 +114,7 @@ def best_division(groups: Mapping[Run, Collection[Ground]], length: int) -> list
             ungrouped, above, minus_groups, _ = best[begin]
             divisions.append((ungrouped, above + len(groups[begin, end]), minus_groups - 1, begin))
         best.append(min(divisions))
-    division: list[Run] = []
+    division: list[StepRange] = []
     while length:
         division.append((best[length][-1], length))
         length = best[length][-1]
@@ -124,9 +124,9 @@ def best_division(groups: Mapping[Run, Collection[Ground]], length: int) -> list
 # ------------------------------------------------------------------------------------------ upper-level steps of a run
 
 
-def runs_of_one_step(views: _Views) -> dict[Run, list[Ground]]:
+def runs_of_one_step(views: _Views) -> dict[StepRange, list[Ground]]:
     """Return the runs that have the effect of a single upper-level step, each with this step."""
-    found: dict[Run, list[Ground]] = {}
+    found: dict[StepRange, list[Ground]] = {}
     for begin in views.resting:
         last = min(begin + LONGEST, len(views.steps))
         views.enter(begin)
@@ -138,7 +138,7 @@ def runs_of_one_step(views: _Views) -> dict[Run, list[Ground]]:
     return found
 
 
-def joint_steps(views: _Views, run: Run, work: int) -> tuple[list[Ground], int]:
+def joint_steps(views: _Views, run: StepRange, work: int) -> tuple[list[Ground], int]:
     """Return upper-level steps that together have the effect of a run, and the remaining work.
 
     The best-first search prefers states with few wrong values. Among these, it prefers states whose new facts hold early in the
@@ -147,7 +147,7 @@ def joint_steps(views: _Views, run: Run, work: int) -> tuple[list[Ground], int]:
     course, tried = views.at[run[0] : run[1] + 1], candidates(views, run)
     first, last = course[0], course[-1]
     holding_at: dict[frozenset[tuple[int, str]], int | None] = {}  # the first position at which new facts hold together
-    before: dict[View, tuple[View, Ground]] = {}
+    before: dict[LevelView, tuple[LevelView, Ground]] = {}
     waiting = [(0, 0, 0, first)]
     while waiting and work > 0 and last not in before:
         *_, state = heappop(waiting)
@@ -172,7 +172,7 @@ def joint_steps(views: _Views, run: Run, work: int) -> tuple[list[Ground], int]:
     return without_needless(views, run, found[::-1], work)
 
 
-def without_needless(views: _Views, run: Run, steps: list[Ground], work: int) -> tuple[list[Ground], int]:
+def without_needless(views: _Views, run: StepRange, steps: list[Ground], work: int) -> tuple[list[Ground], int]:
     """Return the steps without which the joint effect isn't the effect of the run, and the remaining work."""
     for position in reversed(range(len(steps))):
         fewer = steps[:position] + steps[position + 1 :]
@@ -182,7 +182,7 @@ def without_needless(views: _Views, run: Run, steps: list[Ground], work: int) ->
     return steps, work
 
 
-def candidates(views: _Views, run: Run) -> list[Ground]:
+def candidates(views: _Views, run: StepRange) -> list[Ground]:
     """Return the upper-level steps that could make one of the facts true that become true during a run."""
     problem, (begin, end) = views.call.problem, run
     facts = dict[tuple[Cell, str], None]()
@@ -238,7 +238,7 @@ class _Views:
         situations = call.problem.domain.situations
         self.place = {cell: i for i, cell in enumerate(cell for cell in touched if call.space.visible(level, cell))}
         self._amounts = {i for cell, i in self.place.items() if situations[cell[0]].quantity is not None}
-        self.at: list[View] = []
+        self.at: list[LevelView] = []
         for values in self._values:
             call.table.undo(0)
             call.table.put_all(values)
@@ -273,12 +273,12 @@ class _Views:
         pairs = zip(self.resting, self.resting[1:], strict=False)
         return [0, *(i for before, i in pairs if i == len(self.steps) or self.at[i] != self.at[before])]
 
-    def new_facts(self, before: View, after: View) -> frozenset[tuple[int, str]]:
+    def new_facts(self, before: LevelView, after: LevelView) -> frozenset[tuple[int, str]]:
         """Return the places and values in which a view differs from the view before; amounts are left out."""
         pairs = enumerate(zip(before, after, strict=True))
         return frozenset((i, value) for i, (old, value) in pairs if value != old and i not in self._amounts)
 
-    def enter(self, position: int, view: View | None = None) -> None:
+    def enter(self, position: int, view: LevelView | None = None) -> None:
         """Bring the table to the state at a position; the level then sees the values of `view`, if given."""
         table, there = self.call.table, self.at[position]
         table.undo(0)
@@ -286,7 +286,7 @@ class _Views:
         if view is not None and view != there:
             table.put_all({cell: view[i] for cell, i in self.place.items() if view[i] != there[i]})
 
-    def successors(self, steps: Iterable[Ground]) -> Iterator[tuple[Ground, View]]:
+    def successors(self, steps: Iterable[Ground]) -> Iterator[tuple[Ground, LevelView]]:
         """Yield the upper-level steps that are applicable in the table, each with the view afterwards.
 
         Steps that change other symbols than the steps below are left out.
@@ -308,7 +308,7 @@ class _Views:
             else:
                 yield (name, arguments), tuple(after)
 
-    def leads(self, run: Run, steps: Iterable[Ground]) -> bool:
+    def leads(self, run: StepRange, steps: Iterable[Ground]) -> bool:
         """Return whether upper-level steps are applicable at the begin of a run, and lead to the view at its end."""
         self.enter(run[0])
         for name, arguments in steps:
@@ -318,7 +318,7 @@ class _Views:
             self.call.space.apply(done[1])
         return self._now() == self.at[run[1]]
 
-    def _now(self) -> View:
+    def _now(self) -> LevelView:
         now = self.call.table.now
         return tuple(self._seen(now[cell[0]].get(cell[1], FALSE)) for cell in self.place)
 

@@ -15,11 +15,11 @@ from typing import TypeAlias
 from confab.planner.checked_conditions import Arguments
 from confab.planner.plan import Step
 from confab.planner.timed.pieces import Pieces, actors_of, default_actors, duration_of, pieces_of, terms_at
-from confab.planner.validation import BehaviorReader, Cell, Facts
+from confab.planner.validation import BehaviorReader, Cell, LoggedState
 from confab.reasoner.limits import check
 from confab.reasoner.symbols import Behavior, Problem, Times
 
-Key: TypeAlias = "tuple[str, object]"
+ReadAccess: TypeAlias = "tuple[str, object]"
 """A read access: the value of a symbol (situation type and arguments), or all symbols of a situation type with a given value."""
 
 
@@ -46,7 +46,7 @@ class Access:
     `writes` maps each changed symbol to the old and the new value.
     """
 
-    reads: frozenset[Key] = frozenset()
+    reads: frozenset[ReadAccess] = frozenset()
     writes: Mapping[Cell, tuple[str, str]] | None = None
 
     @property
@@ -74,12 +74,12 @@ class Activity:
         return self.begin, self.middle, self.end
 
 
-class Noting(Facts):
+class ReadRecorder(LoggedState):
     """A view of facts that records each read access."""
 
     def __init__(self, problem: Problem, rules: BehaviorReader) -> None:
         super().__init__(problem, problem.initial, rules)
-        self.reads: dict[Key, None] = {}
+        self.reads: dict[ReadAccess, None] = {}
 
     def value(self, situation: str, arguments: Arguments) -> str | None:
         """Return the value of a symbol, and record the access."""
@@ -97,7 +97,7 @@ class Noting(Facts):
         if self.problem.domain.rules:  # cached derived facts would be read without their reasons
             self._definitions.forget()
 
-    def noted(self) -> frozenset[Key]:
+    def noted(self) -> frozenset[ReadAccess]:
         """Return the facts that were read."""
         rules = self.problem.domain.rules
         return frozenset(key for key in self.reads if key[0] not in rules) if rules else frozenset(self.reads)
@@ -119,7 +119,7 @@ def activities(problem: Problem, steps: Sequence[Step], events: Iterable[StepEve
     InapplicableError
         A step isn't applicable at its position in the events.
     """
-    course = _Course(problem, steps)
+    course = _StepSimulation(problem, steps)
     for number, moment in events:
         check("finding the order that the steps need")
         if moment is not EventKind.END:
@@ -134,13 +134,13 @@ def in_sequence(steps: Sequence[Step]) -> Iterator[StepEvent]:
     yield from ((number, EventKind.WHOLE) for number in range(len(steps)))
 
 
-class _Course:
+class _StepSimulation:
     """The simulation of a sequence of steps on symbols."""
 
     def __init__(self, problem: Problem, steps: Sequence[Step]) -> None:
         self.problem, self.steps = problem, steps
         self.rules = BehaviorReader(problem)
-        self.facts = Noting(problem, self.rules)
+        self.facts = ReadRecorder(problem, self.rules)
         self.pieces: dict[str, Pieces] = {}
         self.resting = default_actors(problem)
         self.times = problem.times or Times()
@@ -192,7 +192,7 @@ class _Course:
             raise InapplicableError(
                 f"{step}: its conditions ({piece.name.rsplit('@')[-1]}) don't hold in the state before it"
             )
-        before = {(name, key): Facts.value(facts, name, key) or "" for name, key, _ in changes}
+        before = {(name, key): LoggedState.value(facts, name, key) or "" for name, key, _ in changes}
         writes = {(name, key): (before[name, key], value) for name, key, value in changes}
         if put:
             for cell, (_, value) in writes.items():

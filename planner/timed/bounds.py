@@ -18,7 +18,7 @@ from confab.planner.grounded.task import Task, bits_of
 from confab.planner.hierarchical.bounds import lm_cut
 from confab.planner.plan import Reason, UngroundableError
 from confab.planner.timed.pieces import actors_of, default_actors, duration_of, pieces_of
-from confab.planner.validation import Facts
+from confab.planner.validation import LoggedState
 from confab.reasoner.amounts import situations_in
 from confab.reasoner.symbols import Parameter, Problem, Span
 from confab.reasoner.timing import timing_of
@@ -61,7 +61,7 @@ def of_any_plan(problem: Problem) -> Fraction:
 
 def _durations(problem: Problem, task: Task) -> tuple[list[float], list[int], int]:
     """Return the least duration and the number of actors of each operator, and the number of all actors."""
-    resting, facts, named = default_actors(problem), Facts(problem, problem.initial), set[str]()
+    resting, facts, named = default_actors(problem), LoggedState(problem, problem.initial), set[str]()
     by_actor = problem.times is not None and bool(problem.times.of_actors)
     fixed: dict[str, tuple[Parameter, ...]] = {}
     constant: dict[tuple[str, tuple[str, ...]], float | None] = {}

@@ -18,8 +18,8 @@ from confab.planner.timed.network import Begins, Network, network_of
 from confab.planner.timed.order import BEGIN, END, Order, TurnId, order_of
 from confab.planner.timed.plan import THESE_STEPS, Slot, TimedPlan
 from confab.planner.timed.schedules import (
+    ActorChoices,
     CandidateSchedule,
-    Choices,
     durations_with,
     least,
     shortest,
@@ -128,7 +128,7 @@ def in_time(
     except InapplicableError as error:
         return Timed(reason=Reason(str(error)))
     network = network_of(order, separation)
-    choices = choices_of(problem, plan, order, network) if events is None else Choices()
+    choices = choices_of(problem, plan, order, network) if events is None else ActorChoices()
     proved: int | None = None
     while True:
         bound = least(order, network, choices)
@@ -160,7 +160,7 @@ def in_time(
         choices = replace(choices, of={turn: able for turn, able in choices.of.items() if moved and turn not in moved})
 
 
-def _late(problem: Problem, order: Order, network: Network, choices: Choices, found: CandidateSchedule) -> Reason:
+def _late(problem: Problem, order: Order, network: Network, choices: ActorChoices, found: CandidateSchedule) -> Reason:
     """Return the reason why a schedule is late.
 
     The reason names what the activity with the greatest lateness misses: time windows of individuals, deadlines, or a fixed time.
@@ -211,7 +211,7 @@ def renamed_by(order: Order, turns: Sequence[Sequence[TurnId]]) -> dict[int, dic
 
 
 def timed_plan(
-    problem: Problem, plan: Plan, order: Order, network: Network, choices: Choices, found: CandidateSchedule
+    problem: Problem, plan: Plan, order: Order, network: Network, choices: ActorChoices, found: CandidateSchedule
 ) -> TimedPlan | None:
     """Return a schedule as a timed plan with the actors that the schedule assigns.
 

@@ -30,7 +30,7 @@ from confab.planner.plan import OUT_OF_MEMORY, Counts, Limits, Outcome, Plan, Re
 from confab.planner.timed.activities import EventKind, StepEvent
 from confab.planner.timed.call import Timed, in_time
 from confab.planner.timed.pieces import duration_of
-from confab.planner.validation import Facts
+from confab.planner.validation import LoggedState
 from confab.reasoner.language import walk
 from confab.reasoner.limits import OutOfTimeError, check
 from confab.reasoner.symbols import (
@@ -52,7 +52,7 @@ FIRST = 0.5
 """Share of the time limit for the search without durations."""
 MOST_STATES = 300_000
 """Maximum number of states of the search with durations."""
-_Key: TypeAlias = "tuple[int, tuple[int, ...]]"
+_StateKey: TypeAlias = "tuple[int, tuple[int, ...]]"
 
 
 def plan(problem: Problem, limits: Limits, separation: Fraction = Fraction(0)) -> tuple[Outcome, Timed]:
@@ -221,7 +221,7 @@ def _behavior(behavior: Behavior, name: str, conditions: Sequence[object], effec
 
 
 @dataclass(frozen=True)
-class _Event:
+class _SnapAction:
     """An event: the number of its step, whether the step begins or ends, and the symbols that are read and changed."""
 
     step: int
@@ -232,11 +232,11 @@ class _Event:
 
 
 @dataclass(frozen=True)
-class _Node:
+class _SearchNode:
     """A search node: a state, the events of the window, the durations of the steps, and the running steps."""
 
     state: int
-    window: tuple[_Event, ...]
+    window: tuple[_SnapAction, ...]
     lasts: tuple[int, ...]
     running: Mapping[int, int]  # the operator that ends a step, and the step's number in the window
     held: int  # bits that running steps require throughout their durations
@@ -276,9 +276,9 @@ class _Finder:
         return Fraction(0) if found is None else found
 
     @cached_property
-    def facts(self) -> Facts:
+    def facts(self) -> LoggedState:
         """The facts of the initial state, which determine the durations during the search."""
-        return Facts(self.cut.whole, self.cut.whole.initial)
+        return LoggedState(self.cut.whole, self.cut.whole.initial)
 
     def without_durations(self, limits: Limits) -> Iterator[list[int]]:
         """Yield a sequence of operators from a search that ignores durations, if the search finds a plan.
@@ -312,15 +312,15 @@ class _Finder:
     def in_time(self) -> Iterator[list[int]]:
         """Yield sequences of operators that a search with durations finds."""
         task, evaluate = self.task, heuristic(self.task)
-        root = _Node(task.initial, (), (), {}, 0)
+        root = _SearchNode(task.initial, (), (), {}, 0)
         began = evaluate(task.initial)
         if began is None:
             return
-        came_from: dict[_Key, tuple[_Key, int] | None] = {}
+        came_from: dict[_StateKey, tuple[_StateKey, int] | None] = {}
         key = self.key(root)
         came_from[key] = None
         number = 0
-        queue: list[tuple[int, int, int, _Node, list[int]]] = [(began.h, 0, 0, root, self.ranked(began))]
+        queue: list[tuple[int, int, int, _SearchNode, list[int]]] = [(began.h, 0, 0, root, self.ranked(began))]
         while queue and len(came_from) < MOST_STATES:
             check("searching for concurrent steps", 0.0)
             if self.deadline is not None and perf_counter() > self.deadline:
@@ -348,12 +348,12 @@ class _Finder:
                         heapq.heappush(queue, (h, tries + 1, -number, node, rest))
                     break
 
-    def key(self, node: _Node) -> _Key:
+    def key(self, node: _SearchNode) -> _StateKey:
         """Return the identity of a node: the state, and the `busy` time of each running step."""
         busy = sorted((end, self.busy(node, step)) for end, step in node.running.items())
         return node.state, tuple(number for pair in busy for number in pair)
 
-    def busy(self, node: _Node, step: int) -> int:
+    def busy(self, node: _SearchNode, step: int) -> int:
         """Return the minimum time from the begin of a running step to the events that its end must wait for."""
         end = next(operator for operator, its in node.running.items() if its == step)
         times = self.times(node, {end: step})
@@ -365,7 +365,7 @@ class _Finder:
         preferred = [operator for operator in dict.fromkeys(evaluation.plan) if operator in possible]
         return [*preferred, *sorted(possible.difference(preferred))]
 
-    def after(self, node: _Node, operator: int) -> _Node | None:
+    def after(self, node: _SearchNode, operator: int) -> _SearchNode | None:
         """Return the node after an operator, or None if the node isn't allowed.
 
         A node isn't allowed if the operator is inapplicable, violates a condition of a running step, or delays the end of a running
@@ -380,11 +380,11 @@ class _Finder:
         running, lasts, window = dict(node.running), node.lasts, node.window
         if name.endswith(END):
             step = running.pop(operator)
-            window = (*window, _Event(step, False, True, reads, writes))
+            window = (*window, _SnapAction(step, False, True, reads, writes))
         else:
             begins = name.endswith(BEGIN)
             step, lasts = len(lasts), (*lasts, self.lasts[operator])
-            window = (*window, _Event(step, True, not begins, reads, writes))
+            window = (*window, _SnapAction(step, True, not begins, reads, writes))
             if begins:
                 end = self.ending(operator)
                 if end is None:
@@ -397,10 +397,10 @@ class _Finder:
         if kept & ~state:
             return None
         if not running:
-            if node.running and self.times(_Node(state, window, lasts, {}, 0), {}) is None:
+            if node.running and self.times(_SearchNode(state, window, lasts, {}, 0), {}) is None:
                 return None
-            return _Node(state, (), (), {}, 0)
-        found = _Node(state, window, lasts, running, held)
+            return _SearchNode(state, (), (), {}, 0)
+        found = _SearchNode(state, window, lasts, running, held)
         return found if self.times(found, running) is not None else None
 
     def access(self, operator: int) -> tuple[int, int]:
@@ -458,7 +458,7 @@ class _Finder:
     def _held(self) -> dict[int, int]:
         return {}
 
-    def times(self, node: _Node, ending: Mapping[int, int]) -> list[int] | None:
+    def times(self, node: _SearchNode, ending: Mapping[int, int]) -> list[int] | None:
         """Return the earliest begins of a node's steps if the running steps in `ending` end next.
 
         The last entry is the time from the begin of the first ending step to the events that its end must wait for. Return None if
@@ -466,7 +466,7 @@ class _Finder:
         """
         events = list(node.window)
         for end, step in ending.items():
-            events.append(_Event(step, False, True, *self.access(end)))
+            events.append(_SnapAction(step, False, True, *self.access(end)))
         arcs: list[tuple[int, int, int]] = []
         lasts = node.lasts
         for j, later in enumerate(events):
@@ -493,8 +493,8 @@ class _Finder:
 
     def path(
         self,
-        came_from: Mapping[_Key, tuple[_Key, int] | None],
-        key: _Key,
+        came_from: Mapping[_StateKey, tuple[_StateKey, int] | None],
+        key: _StateKey,
     ) -> list[int]:
         """Return the operators on the path to a node."""
         found = []

@@ -11,7 +11,7 @@ from typing import Any
 
 from confab.planner.timed.network import ALWAYS, Network, earliest
 from confab.planner.timed.order import BEGIN, END, Order, TurnId
-from confab.planner.timed.schedules import CandidateSchedule, Choices, durations_with, turn_edges
+from confab.planner.timed.schedules import ActorChoices, CandidateSchedule, durations_with, turn_edges
 
 WORK = 1.0
 """Maximum deterministic time of the solver; the unit is a few seconds."""
@@ -20,7 +20,7 @@ LARGEST = 2**40
 
 
 def shorter(
-    order: Order, network: Network, choices: Choices, found: CandidateSchedule, bound: int, seconds: float
+    order: Order, network: Network, choices: ActorChoices, found: CandidateSchedule, bound: int, seconds: float
 ) -> tuple[CandidateSchedule, int]:
     """Return the best schedule that the solver finds, at least as short as the given schedule, and a lower bound.
 
@@ -28,7 +28,7 @@ def shorter(
     ----------
     order : Order
     network : Network
-    choices : Choices
+    choices : ActorChoices
         The choices of actors for `order`.
     found : CandidateSchedule
         A schedule for `order`.
@@ -47,7 +47,7 @@ def shorter(
     solver.parameters.max_deterministic_time = WORK
     solver.parameters.num_workers = 1
     solver.parameters.random_seed = 0
-    made = _Model(model, order, network, choices, found, bound)
+    made = _ScheduleModel(model, order, network, choices, found, bound)
     status = solver.Solve(model)
     best = max(bound, round(solver.BestObjectiveBound()))
     if network.tick > network.separation and any(network.least(*edge) > network.separation for edge in network.edges):
@@ -61,11 +61,11 @@ def shorter(
     return CandidateSchedule(turns, begins), min(best, begins.makespan)
 
 
-class _Model:
+class _ScheduleModel:
     """The variables and the constraints of the solver's model of a schedule."""
 
     def __init__(
-        self, model: Any, order: Order, network: Network, choices: Choices, found: CandidateSchedule, bound: int
+        self, model: Any, order: Order, network: Network, choices: ActorChoices, found: CandidateSchedule, bound: int
     ) -> None:
         self.model, self.order, self.network, self.choices, self.found = model, order, network, choices, found
         fixed = [at for at in network.at if at is not None]

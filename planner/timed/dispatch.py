@@ -27,8 +27,8 @@ from confab.planner.timed.network import Begins, Network, earliest, network_of
 from confab.planner.timed.order import BEGIN, END, Edge, TurnId, order_of
 from confab.planner.timed.plan import Slot, TimedPlan
 from confab.planner.timed.schedules import (
+    ActorChoices,
     CandidateSchedule,
-    Choices,
     durations_with,
     rescheduled,
     turn_edges,
@@ -79,7 +79,7 @@ class Dispatch:
         ]
         every = [*self.network.edges, *turn_edges(self.order, self.turns)]
         self.controlled = all(low == BEGIN for *_, low in every)
-        self.choices = choices_of(problem, timed.plan, self.order, self.network) if self.controlled else Choices()
+        self.choices = choices_of(problem, timed.plan, self.order, self.network) if self.controlled else ActorChoices()
         times = problem.times or Times()
         self._untimed = replace(problem, times=Times(events=times.events))
         self.begun: dict[int, int] = {}
@@ -253,7 +253,7 @@ class Dispatch:
         lasts, begins = self._expected(time)
         base = [lasts[i] if i in known else its for i, its in enumerate(self.network.durations)]
         network = replace(self._rest(time, self.network.edges), durations=base)
-        choices = Choices(
+        choices = ActorChoices(
             {turn: able for turn, able in self.choices.of.items() if turn not in fixed},
             {key: {} if key[0] in fixed else its for key, its in self.choices.lasts.items()},
         )
@@ -267,7 +267,7 @@ class Dispatch:
 
     def _plan(self, found: CandidateSchedule, lasts: Sequence[int]) -> TimedPlan | None:
         """Return the plan with the begins of a schedule and with the given durations."""
-        choices = Choices({}, {key: {} for key in self.choices.lasts})
+        choices = ActorChoices({}, {key: {} for key in self.choices.lasts})
         return timed_plan(
             self.problem, self.plan, self.order, replace(self.network, durations=list(lasts)), choices, found
         )
@@ -285,7 +285,7 @@ def _events(timed: TimedPlan) -> Iterator[StepEvent]:
 
 
 @dataclass(frozen=True)
-class Run:
+class DispatchRun:
     """A simulated execution.
 
     `timed` is the plan with its actual times, or None if primitives remain. `slots` contains the begun primitives in the order
@@ -299,7 +299,7 @@ class Run:
     said: Mapping[Symbol, Fraction]
 
 
-def simulated(dispatch: Dispatch, actual: Callable[[int, Fraction], Fraction]) -> Run:
+def simulated(dispatch: Dispatch, actual: Callable[[int, Fraction], Fraction]) -> DispatchRun:
     """Execute a plan in a simulation.
 
     Parameters
@@ -332,4 +332,4 @@ def simulated(dispatch: Dispatch, actual: Callable[[int, Fraction], Fraction]) -
             dispatch.end(heapq.heappop(running)[1], now)
     slots = tuple(Slot(dispatch.step(i), *begins[i]) for i in sorted(begins))
     waiting = tuple(map(dispatch.step, dispatch.waiting))
-    return Run(None if waiting else dispatch.timed(now), slots, waiting, said)
+    return DispatchRun(None if waiting else dispatch.timed(now), slots, waiting, said)

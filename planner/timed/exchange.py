@@ -14,8 +14,8 @@ from confab.planner.plan import Plan, Step
 from confab.planner.timed.network import Network
 from confab.planner.timed.order import Order, TurnId
 from confab.planner.timed.pieces import duration_of, pieces_of
-from confab.planner.timed.schedules import Choices
-from confab.planner.validation import BehaviorReader, Facts
+from confab.planner.timed.schedules import ActorChoices
+from confab.planner.validation import BehaviorReader, LoggedState
 from confab.reasoner.amounts import situations_in
 from confab.reasoner.symbols import (
     ClassCondition,
@@ -27,7 +27,7 @@ from confab.reasoner.symbols import (
 )
 
 
-def choices_of(problem: Problem, plan: Plan, order: Order, network: Network) -> Choices:
+def choices_of(problem: Problem, plan: Plan, order: Order, network: Network) -> ActorChoices:
     """Return, for each turn in an order of activities, the actors that could take the turn.
 
     Parameters
@@ -42,8 +42,8 @@ def choices_of(problem: Problem, plan: Plan, order: Order, network: Network) -> 
     actors = {one.actor: i for i, one in enumerate(order.resources) if one.actor is not None}
     every = _of_the_classes(problem, actors)
     if not any(every.values()):
-        return Choices()
-    rules, facts = BehaviorReader(problem), Facts(problem, problem.initial)
+        return ActorChoices()
+    rules, facts = BehaviorReader(problem), LoggedState(problem, problem.initial)
     whole = _whole_steps(plan, order)
     steps = {step.path: step for step in plan.walk()}
     above = [[steps[step.path[:depth]] for depth in range(1, len(step.path))] for step in plan.primitives]
@@ -65,7 +65,7 @@ def choices_of(problem: Problem, plan: Plan, order: Order, network: Network) -> 
                     lasts[(resource, number), actors[other]] = durations
             if len(able) > 1:
                 of[resource, number] = tuple(able)
-    return Choices(of, lasts)
+    return ActorChoices(of, lasts)
 
 
 def exchanged(problem: Problem, plan: Plan, renamed: Mapping[int, Mapping[str, str]]) -> Plan:
@@ -153,7 +153,7 @@ def _whole_steps(plan: Plan, order: Order) -> Callable[[str, Sequence[int]], boo
 
 
 def possible(
-    problem: Problem, rules: BehaviorReader, facts: Facts, step: Step, names: Mapping[str, str]
+    problem: Problem, rules: BehaviorReader, facts: LoggedState, step: Step, names: Mapping[str, str]
 ) -> dict[str, str] | None:
     """Return the individuals of a step after some are replaced, or None if static facts don't allow the new individuals."""
     behavior = problem.domain.behaviors[step.behavior]
@@ -169,7 +169,7 @@ def possible(
 def _durations(
     problem: Problem,
     rules: BehaviorReader,
-    facts: Facts,
+    facts: LoggedState,
     order: Order,
     network: Network,
     members: Sequence[int],

@@ -8,7 +8,7 @@ from dataclasses import replace
 from fractions import Fraction
 
 from confab.planner.timed.pieces import actors_of, default_actors, pieces_of
-from confab.reasoner.memory.experience import Measured, Statistics
+from confab.reasoner.memory.experience import MeasuredDuration, Statistics
 from confab.reasoner.symbols import PrimitiveStep, Problem, Times
 
 PARTS = 1000
@@ -34,7 +34,7 @@ def measured(problem: Problem, executed: Iterable[tuple[PrimitiveStep, float]]) 
         terms = (*step.arguments, *(step.bindings.get(v.name[1:], v.name) for v in fixed))
         for actor in ("", *actors_of(problem, behavior, terms, resting)):
             found[step.behavior, actor].append(seconds)
-    return {key: Measured.of(seconds) for key, seconds in sorted(found.items())}
+    return {key: MeasuredDuration.of(seconds) for key, seconds in sorted(found.items())}
 
 
 def with_durations(problem: Problem, statistics: Statistics) -> Problem:

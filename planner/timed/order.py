@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import pairwise
 
-from confab.planner.timed.activities import Activity, EventKind, InapplicableError, Key, StepEvent
+from confab.planner.timed.activities import Activity, EventKind, InapplicableError, ReadAccess, StepEvent
 from confab.planner.validation import Cell
 from confab.reasoner.symbols import Problem, Times
 
@@ -78,7 +78,7 @@ class Order:
 
 
 @dataclass(frozen=True)
-class _Record:
+class _TimedAccess:
     """An access of an activity to a symbol, from the event `low` to the event `high`; both are the begin or the end."""
 
     activity: int
@@ -114,7 +114,7 @@ def order_of(problem: Problem, activities: Sequence[Activity], events: Iterable[
     loose = sorted(cell for cell in returning if not any(actor in cell[1] for actor in actors))
     looked = _looked(records, touched)
     free = {key: groups for key, groups in looked.items() if all(map(_returns, groups))}
-    own: dict[Cell | Key, int] = {c: i for i, actor in enumerate(actors) for c in owned[actor]}
+    own: dict[Cell | ReadAccess, int] = {c: i for i, actor in enumerate(actors) for c in owned[actor]}
     for one, groups in [*((cell, [records[cell]]) for cell in loose), *free.items()]:
         own[one] = len(resources)
         resources.append(Resource(_turns(groups, ends), value=one[1] if isinstance(one[1], str) else None))
@@ -139,10 +139,10 @@ def order_of(problem: Problem, activities: Sequence[Activity], events: Iterable[
 
 def _records(
     activities: Sequence[Activity], events: Iterable[StepEvent]
-) -> tuple[dict[Cell, list[_Record]], dict[Key, list[_Record]], dict[int, int], dict[int, int]]:
+) -> tuple[dict[Cell, list[_TimedAccess]], dict[ReadAccess, list[_TimedAccess]], dict[int, int], dict[int, int]]:
     """Return the accesses to each symbol, the look-ups of the symbols with each value, and the positions of begins and of ends."""
-    cells: dict[Cell, list[_Record]] = defaultdict(list)
-    values: dict[Key, list[_Record]] = defaultdict(list)
+    cells: dict[Cell, list[_TimedAccess]] = defaultdict(list)
+    values: dict[ReadAccess, list[_TimedAccess]] = defaultdict(list)
     starts: dict[int, int] = {}
     ends: dict[int, int] = {}
     position = 0
@@ -159,16 +159,16 @@ def _records(
             at = position - (moment is EventKind.WHOLE and low == BEGIN)
             for key in access.reads:
                 if isinstance(key[1], str):
-                    values[key].append(_Record(number, low, high, None, at))
+                    values[key].append(_TimedAccess(number, low, high, None, at))
                 elif key not in access.changes:
-                    cells[key].append(_Record(number, low, high, None, at))  # type: ignore[index]
+                    cells[key].append(_TimedAccess(number, low, high, None, at))  # type: ignore[index]
             for cell, pair in access.changes.items():
-                cells[cell].append(_Record(number, low, high, pair, at))
+                cells[cell].append(_TimedAccess(number, low, high, pair, at))
         position += 1
     return cells, values, starts, ends
 
 
-def _returns(records: Sequence[_Record]) -> bool:
+def _returns(records: Sequence[_TimedAccess]) -> bool:
     """Return whether some access changes a symbol, and the last change restores the first value."""
     written = [record.written for record in records if record.written is not None]
     return bool(written) and written[-1][1] == written[0][0]
@@ -179,14 +179,14 @@ def _sole(cell: Cell, actors: Mapping[str, None]) -> bool:
     return sum(argument in actors for argument in cell[1]) == 1
 
 
-def _turns(groups: Sequence[Sequence[_Record]], ends: Mapping[int, int]) -> tuple[Turn, ...]:
+def _turns(groups: Sequence[Sequence[_TimedAccess]], ends: Mapping[int, int]) -> tuple[Turn, ...]:
     """Return the common turns of several symbols; each group contains the accesses to one symbol."""
     first = [next(r.written[0] for r in records if r.written is not None) for records in groups]
     order = sorted(
         ((record.position, i, record) for i, records in enumerate(groups) for record in records),
         key=lambda entry: (entry[0], entry[2].low),
     )
-    now, found, current, until = list(first), list[list[_Record]](), list[_Record](), -1
+    now, found, current, until = list(first), list[list[_TimedAccess]](), list[_TimedAccess](), -1
     for position, i, record in order:
         if current and now == first and position > until:
             found.append(current)
@@ -200,7 +200,7 @@ def _turns(groups: Sequence[Sequence[_Record]], ends: Mapping[int, int]) -> tupl
     return tuple(map(_turn, found))
 
 
-def _turn(records: Sequence[_Record]) -> Turn:
+def _turn(records: Sequence[_TimedAccess]) -> Turn:
     members = tuple(dict.fromkeys(record.activity for record in records))
     lows = tuple(dict.fromkeys((r.activity, r.low) for r in records))
     highs = tuple(dict.fromkeys((r.activity, r.high) for r in records))
@@ -210,7 +210,7 @@ def _turn(records: Sequence[_Record]) -> Turn:
 def _actor(
     actor: str,
     activities: Sequence[Activity],
-    cells: Mapping[Cell, Sequence[_Record]],
+    cells: Mapping[Cell, Sequence[_TimedAccess]],
     starts: Mapping[int, int],
     ends: Mapping[int, int],
 ) -> Resource:
@@ -219,7 +219,7 @@ def _actor(
     During a turn, the actor executes an activity, or some symbol about the actor differs from its first value.
     """
     its = sorted((n for n, one in enumerate(activities) if actor in one.actors), key=lambda n: starts[n])
-    busy = [_Record(n, BEGIN, END, ("", ""), starts[n]) for n in its]
+    busy = [_TimedAccess(n, BEGIN, END, ("", ""), starts[n]) for n in its]
     return Resource(_turns([busy, *cells.values()], ends), actor)
 
 
@@ -232,14 +232,14 @@ def _idle(problem: Problem, actors: Iterable[str]) -> list[str]:
 
 
 def _chained(
-    records: Sequence[_Record],
+    records: Sequence[_TimedAccess],
     ends: Mapping[int, int],
     activities: Sequence[Activity],
     turn_of: Mapping[int, int] | None,
 ) -> Iterator[Edge]:
     """Yield the edges between conflicting accesses to a symbol; if the symbol has turns, only edges within a turn."""
-    last: _Record | None = None
-    readers: list[_Record] = []
+    last: _TimedAccess | None = None
+    readers: list[_TimedAccess] = []
     turn: int | None = None
     for record in records:
         if turn_of is not None and turn_of[record.activity] != turn:
@@ -263,13 +263,13 @@ def _chained(
 
 
 def _looked(
-    records: Mapping[Cell, Sequence[_Record]], values: Mapping[Key, Sequence[_Record]]
-) -> dict[Key, list[list[_Record]]]:
+    records: Mapping[Cell, Sequence[_TimedAccess]], values: Mapping[ReadAccess, Sequence[_TimedAccess]]
+) -> dict[ReadAccess, list[list[_TimedAccess]]]:
     """Return the accesses to each looked-up set of symbols with a value: a group for each symbol that enters or leaves the set.
 
     A change is represented by whether the symbol has the value before and after. The first group also contains the look-ups.
     """
-    found: dict[Key, dict[Cell, list[_Record]]] = defaultdict(dict)
+    found: dict[ReadAccess, dict[Cell, list[_TimedAccess]]] = defaultdict(dict)
     for cell, its in records.items() if values else ():
         for record in its:
             for value in set(record.written or ()) if record.written and record.written[0] != record.written[1] else ():
@@ -283,7 +283,7 @@ def _looked(
 
 
 def _touching(
-    groups: Sequence[Sequence[_Record]], ends: Mapping[int, int], turn_of: Mapping[int, int] | None
+    groups: Sequence[Sequence[_TimedAccess]], ends: Mapping[int, int], turn_of: Mapping[int, int] | None
 ) -> Iterator[Edge]:
     """Yield the edges between look-ups of a set and its changes; if the set has turns, only edges within a turn."""
     every = [record for its in groups for record in its]
@@ -299,7 +299,7 @@ def _touching(
 
 
 def _latest(
-    problem: Problem, times: Times, records: Mapping[Cell, Sequence[_Record]]
+    problem: Problem, times: Times, records: Mapping[Cell, Sequence[_TimedAccess]]
 ) -> dict[tuple[int, int], Fraction]:
     """Return the latest times of events; each event is the last change of a goal with a deadline."""
     found: dict[tuple[int, int], Fraction] = {}

@@ -17,7 +17,7 @@ from fractions import Fraction
 
 from confab.planner.checked_amounts import worth
 from confab.planner.checked_conditions import Arguments, ConditionReader, variables
-from confab.planner.validation import BehaviorReader, Facts
+from confab.planner.validation import BehaviorReader, LoggedState
 from confab.reasoner.symbols import (
     AmountEffect,
     Behavior,
@@ -85,7 +85,7 @@ def _fixed(behavior: Behavior) -> tuple[Parameter, ...]:
     return tuple(variable for variable in behavior.variables if variable.name in named)
 
 
-def terms_at(rules: BehaviorReader, pieces: Pieces, arguments: Arguments, facts: Facts) -> Arguments:
+def terms_at(rules: BehaviorReader, pieces: Pieces, arguments: Arguments, facts: LoggedState) -> Arguments:
     """When a behaviour begins, return the individuals for the parameters of its pieces."""
     behavior = pieces.whole
     if not pieces.fixed:
@@ -95,7 +95,7 @@ def terms_at(rules: BehaviorReader, pieces: Pieces, arguments: Arguments, facts:
     return (*arguments, *(found.get(v.name, v.name) for v in pieces.fixed))
 
 
-def duration_of(problem: Problem, behavior: Behavior, arguments: Arguments, facts: Facts) -> Fraction | None:
+def duration_of(problem: Problem, behavior: Behavior, arguments: Arguments, facts: LoggedState) -> Fraction | None:
     """Return the duration of a step at its begin, in seconds, or None if the duration isn't a number or is negative.
 
     `arguments` is a result of `terms_at`.

@@ -26,7 +26,7 @@ TABU = 8
 
 
 @dataclass(frozen=True)
-class Choices:
+class ActorChoices:
     """The possible actors of turns.
 
     `of` contains the resources that can take a turn, the resource of the plan first. `lasts` contains the durations of the turn's
@@ -51,7 +51,7 @@ class CandidateSchedule:
 
 
 def shortest(
-    order: Order, network: Network, choices: Choices, until: float, bound: int = 0
+    order: Order, network: Network, choices: ActorChoices, until: float, bound: int = 0
 ) -> CandidateSchedule | None:
     """Return the best schedule that the greedy construction and exchanges of turns find, or None if no schedule is found.
 
@@ -62,13 +62,13 @@ def shortest(
     order : Order
     network : Network
         The network of `order`.
-    choices : Choices
+    choices : ActorChoices
     until : float
         The end of the search on the clock of `perf_counter`.
     bound : int
         A lower bound on the makespan.
     """
-    search = _Search(order, network, choices)
+    search = _ScheduleSearch(order, network, choices)
     starts = [search.evaluated(turns) for turns in search.starts()]
     found = [start for start in starts if start is not None]
     if not found:
@@ -79,7 +79,7 @@ def shortest(
 def rescheduled(
     order: Order,
     network: Network,
-    choices: Choices,
+    choices: ActorChoices,
     turns: Sequence[Sequence[TurnId]],
     fixed: Container[TurnId],
     work: int,
@@ -90,7 +90,7 @@ def rescheduled(
     ----------
     order : Order
     network : Network
-    choices : Choices
+    choices : ActorChoices
     turns : sequence of sequence of (int, int)
         The first order of the turns of each resource.
     fixed : container of (int, int)
@@ -98,7 +98,7 @@ def rescheduled(
     work : int
         Maximum number of arcs that the exchanges process.
     """
-    search = _Search(order, network, choices, fixed, work)
+    search = _ScheduleSearch(order, network, choices, fixed, work)
     start = search.evaluated([list(line) for line in turns])
     return None if start is None else search.improved(start, inf, 0)
 
@@ -119,7 +119,7 @@ def turn_edges(order: Order, turns: Sequence[Sequence[TurnId]]) -> Iterator[Edge
                 last, readers = turn, []
 
 
-def durations_with(network: Network, choices: Choices, turns: Sequence[Sequence[TurnId]]) -> list[int]:
+def durations_with(network: Network, choices: ActorChoices, turns: Sequence[Sequence[TurnId]]) -> list[int]:
     """Return the durations of activities if the actors take the given turns."""
     found = list(network.durations)
     for resource, line in enumerate(turns):
@@ -130,12 +130,12 @@ def durations_with(network: Network, choices: Choices, turns: Sequence[Sequence[
     return found
 
 
-class _Search:
+class _ScheduleSearch:
     def __init__(
         self,
         order: Order,
         network: Network,
-        choices: Choices,
+        choices: ActorChoices,
         fixed: Container[TurnId] = (),
         work: int = MOST_ARCS,
     ) -> None:
@@ -245,7 +245,7 @@ class _Search:
         return found
 
 
-def least(order: Order, network: Network, choices: Choices) -> int:
+def least(order: Order, network: Network, choices: ActorChoices) -> int:
     """Return a lower bound on the makespan of any schedule of the activities with any possible actors.
 
     The bound is the greater of two numbers: the longest chain of precedences, and the work of exchangeable actors divided by the

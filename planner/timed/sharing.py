@@ -31,7 +31,7 @@ from confab.planner.timed.network import earliest, network_of
 from confab.planner.timed.order import order_of
 from confab.planner.timed.pieces import default_actors
 from confab.planner.timed.schedules import turn_edges
-from confab.planner.validation import BehaviorReader, Facts, validate
+from confab.planner.validation import BehaviorReader, LoggedState, validate
 from confab.reasoner.limits import LimitError
 from confab.reasoner.symbols import AnyOf, Behavior, EqualityCondition, Problem, Symbol, ValueCondition
 from confab.reasoner.timing import timing_of
@@ -69,7 +69,7 @@ Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
 """A behaviour with its arguments."""
 Aim: TypeAlias = "Symbol | Ground"
 """The aim of a task: a goal, or a step of the first level that is executed early."""
-Task: TypeAlias = "tuple[Aim, Crew]"
+SharedTask: TypeAlias = "tuple[Aim, Crew]"
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class _Stretch:
 class _Sequence:
     """A sequence of tasks with their stretches and the schedule of all steps."""
 
-    tasks: list[Task]
+    tasks: list[SharedTask]
     stretches: list[_Stretch]
     cost: tuple[Fraction, Fraction, Fraction]
     """The value to be minimised: the lateness, the makespan, and the sum of the squares of the actors' work."""
@@ -124,7 +124,7 @@ def shared(problem: Problem, plan: Plan, until: float | None, shorten: bool = Tr
     shorten : bool
         Whether the search continues after it has found a schedule that keeps all time windows and deadlines.
     """
-    search = _Search(problem, plan, until, shorten)
+    search = _SharingSearch(problem, plan, until, shorten)
     with suppress(LimitError):
         search.run()
     best = search.best
@@ -191,7 +191,7 @@ def with_crew(problem: Problem, crew: Crew) -> Problem:
 
 
 @dataclass
-class _Search:
+class _SharingSearch:
     problem: Problem
     plan: Plan
     until: float | None
@@ -200,9 +200,9 @@ class _Search:
     stretches: dict[object, _Stretch | None] = field(default_factory=dict)
     work: int = 0
     most: int = MOST_WORK
-    known: dict[tuple[Task, frozenset[Aim]], list[tuple[Step, ...]]] = field(default_factory=dict)
+    known: dict[tuple[SharedTask, frozenset[Aim]], list[tuple[Step, ...]]] = field(default_factory=dict)
     """Known sequences of steps for each task after the same early steps; the planner tries these sequences before it searches."""
-    failed: Counter[Task] = field(default_factory=Counter)
+    failed: Counter[SharedTask] = field(default_factory=Counter)
     """The number of times that no steps were found for a task, by task."""
     compiled: dict[Crew, tuple[Problem, Compiled]] = field(default_factory=dict)
 
@@ -219,7 +219,7 @@ class _Search:
     @cached_property
     def last(self) -> dict[Symbol, int]:
         """The position of the last primitive of the plan that changes a symbol, by symbol."""
-        rules, facts = self.rules, Facts(self.problem, self.problem.initial, self.rules)
+        rules, facts = self.rules, LoggedState(self.problem, self.problem.initial, self.rules)
         last: dict[Symbol, int] = {}
         for number, step in enumerate(self.plan.primitives):
             behavior = self.problem.domain.behaviors[step.behavior]
@@ -306,7 +306,7 @@ class _Search:
             now = min(found, key=lambda one: (one.cost[0], one.end, *one.cost[1:]))
         return now
 
-    def changed(self, now: _Sequence, random: Random) -> list[Task]:
+    def changed(self, now: _Sequence, random: Random) -> list[SharedTask]:
         """Return the tasks of a sequence after one random change.
 
         The change assigns another crew to a task, exchanges the crews of two tasks, bars an actor or a step of a task, or moves a
@@ -337,7 +337,7 @@ class _Search:
             tasks.insert(j, tasks.pop(i))
         return tasks
 
-    def built(self, tasks: Sequence[Task], like: _Sequence | None) -> _Sequence | None:
+    def built(self, tasks: Sequence[SharedTask], like: _Sequence | None) -> _Sequence | None:
         """Return the sequence of tasks with stretches and schedule, or None if a task isn't achieved.
 
         The sequence reuses the stretches of the first tasks that it has in common with the sequence `like`.
@@ -397,7 +397,7 @@ class _Search:
 
     def after(self, state: State, steps: tuple[Step, ...]) -> State:
         """Return the state after the given steps."""
-        facts = Facts(self.problem, state, self.rules)
+        facts = LoggedState(self.problem, state, self.rules)
         for step in Plan(steps).primitives:
             for change in self.rules.changes(self.problem.domain.behaviors[step.behavior], step.arguments, facts) or ():
                 facts.put(*change)
@@ -451,7 +451,7 @@ class _Search:
     def _open(self) -> frozenset[Symbol]:
         return frozenset(self.goals)
 
-    def scheduled(self, tasks: list[Task], stretches: list[_Stretch]) -> _Sequence | None:
+    def scheduled(self, tasks: list[SharedTask], stretches: list[_Stretch]) -> _Sequence | None:
         """Return the sequence of tasks with the earliest schedule of their steps in the given order."""
         plan = Plan(renumbered(step for one in stretches for step in one.steps))
         steps = plan.primitives

@@ -14,7 +14,7 @@ from confab.planner.plan import Plan
 from confab.planner.timed.activities import InapplicableError, activities, in_sequence
 from confab.planner.timed.exchange import exchanged, possible
 from confab.planner.timed.order import order_of
-from confab.planner.validation import BehaviorReader, Facts, validate
+from confab.planner.validation import BehaviorReader, LoggedState, validate
 from confab.reasoner.symbols import Problem
 
 
@@ -28,7 +28,7 @@ def spread(problem: Problem, plan: Plan) -> Plan:
         order = order_of(problem, activities(problem, steps, in_sequence(steps)), in_sequence(steps))
     except InapplicableError:
         return plan
-    rules, facts = BehaviorReader(problem), Facts(problem, problem.initial)
+    rules, facts = BehaviorReader(problem), LoggedState(problem, problem.initial)
     every = {step.path: step for step in plan.walk()}
     above = [[every[step.path[:depth]] for depth in range(1, len(step.path) + 1)] for step in steps]
     naming: dict[str, list[int]] = defaultdict(list)

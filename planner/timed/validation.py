@@ -15,7 +15,7 @@ from confab.planner.checked_conditions import Arguments
 from confab.planner.plan import Step
 from confab.planner.timed.pieces import Pieces, actors_of, default_actors, duration_of, pieces_of, terms_at
 from confab.planner.timed.plan import Slot, TimedPlan
-from confab.planner.validation import BehaviorReader, Cell, Facts, Fault, NewValue, validate
+from confab.planner.validation import BehaviorReader, Cell, Fault, LoggedState, NewValue, validate
 from confab.reasoner.amounts import meets
 from confab.reasoner.symbols import FALSE, Behavior, Problem, Times
 from confab.reasoner.timing import only_during
@@ -43,7 +43,7 @@ def validate_timed(
         sequence = _in_sequence(problem, timed.plan.primitives)
     if [slot.step for slot in timed.slots] != list(timed.plan.primitives):
         faults.append(Fault((), "the schedule isn't of the plan's primitives"))
-    return faults or list(_Clock(problem, timed, separation, sequence, executed).run())
+    return faults or list(_TimedExecution(problem, timed, separation, sequence, executed).run())
 
 
 @dataclass
@@ -57,7 +57,7 @@ class _Running:
     number: int
 
 
-class _Watched(Facts):
+class _Watched(LoggedState):
     """A view of facts that records two kinds of reads: the value of a symbol, and all symbols with a given value."""
 
     def __init__(self, problem: Problem, rules: BehaviorReader) -> None:
@@ -84,7 +84,7 @@ Effects = tuple[tuple[Cell, str], ...]
 
 def _in_sequence(problem: Problem, steps: Sequence[Step]) -> tuple[list[Effects], dict[Cell, int]]:
     """Return the changes of each step of a sequence, and the last step that changes each symbol."""
-    rules, facts = BehaviorReader(problem), Facts(problem, problem.initial)
+    rules, facts = BehaviorReader(problem), LoggedState(problem, problem.initial)
     found, last = list[Effects](), dict[Cell, int]()
     for number, step in enumerate(steps):
         changes = rules.changes(problem.domain.behaviors[step.behavior], step.arguments, facts) or []
@@ -96,7 +96,7 @@ def _in_sequence(problem: Problem, steps: Sequence[Step]) -> tuple[list[Effects]
     return found, last
 
 
-class _Clock:
+class _TimedExecution:
     """The simulation of a timed plan on symbols."""
 
     def __init__(
@@ -225,7 +225,7 @@ class _Clock:
 
     def put(self, one: _Running, cell: Cell, value: str, time: Fraction) -> None:
         """Set the value of a symbol, and record the step and the time."""
-        if Facts.value(self.facts, *cell) != value:
+        if LoggedState.value(self.facts, *cell) != value:
             self.changed[cell] = time
         self.facts.put(*cell, value)
         self.made[one.number][cell] = value
@@ -243,7 +243,7 @@ class _Clock:
             if other.number == one.number:
                 continue
             for name, key, value in other.making:
-                old = Facts.value(self.facts, name, key)
+                old = LoggedState.value(self.facts, name, key)
                 if (name, key) in read or (name, key) in changed or {(name, old), (name, value)} & values:
                     yield Fault(
                         one.slot.step.path,

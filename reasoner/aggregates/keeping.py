@@ -27,8 +27,8 @@ from confab.reasoner.afterwards import (
     OPPOSITE,
     Afterwards,
     Conjunction,
-    Formula,
-    Term,
+    ScaledAmount,
+    Simplified,
     TooManyCasesError,
     both,
     negation,
@@ -124,7 +124,7 @@ def _timed(
 
 
 @dataclass(frozen=True)
-class _Candidate:
+class _Contribution:
     """The tuples whose contribution to a total may be changed by one effect on one symbol of the aggregate.
 
     `effect` is a copy of the effect in which the variables have new names. `named` are the arguments of the symbol and `value` its
@@ -137,7 +137,7 @@ class _Candidate:
     named: tuple[str, ...]
     value: str | None
     before: bool
-    term: Term | None = None
+    term: ScaledAmount | None = None
 
 
 class _Keeping:
@@ -188,7 +188,7 @@ class _Keeping:
         amounts = (*self.own.amounts, *effects)
         return replace(self.own, variables=variables, amounts=amounts)
 
-    def _candidates(self) -> Iterator[_Candidate]:
+    def _candidates(self) -> Iterator[_Contribution]:
         """Yield a candidate for each pair of an effect and a symbol in the aggregate that the effect may change."""
         for condition, wanted in (pair for c in self.conditions for pair in _signed(c)):
             if isinstance(condition, ValueCondition):
@@ -205,33 +205,33 @@ class _Keeping:
             for change in (e for e in self.after.amounts if e.situation == term[0].situation):
                 yield replace(self._candidate(change, term[0].arguments, None, False), term=term)
 
-    def _of_amounts(self, expression: Expression) -> Iterator[_Candidate]:
+    def _of_amounts(self, expression: Expression) -> Iterator[_Contribution]:
         for part in inside(expression):
             if isinstance(part, Amount):
                 for effect in (e for e in self.after.amounts if e.situation == part.situation):
                     yield self._candidate(effect, part.arguments, None, False)
 
-    def _candidate(self, effect: Effect, named: tuple[str, ...], value: str | None, before: bool) -> _Candidate:
+    def _candidate(self, effect: Effect, named: tuple[str, ...], value: str | None, before: bool) -> _Contribution:
         """Return the candidate of an effect and a symbol.
 
         For an effect on each member of a class, a witness may bind the member; the candidate then doesn't name the member.
         """
         effect = self.after.apart(effect)
         if effect.each is None:
-            return _Candidate(effect, named, value, before)
+            return _Contribution(effect, named, value, before)
         sought = named[effect.arguments.index(effect.each.name)]
         if sought in self.names or not is_variable(sought):
-            return _Candidate(effect, named, value, before)
+            return _Contribution(effect, named, value, before)
         own = zip(effect.arguments, named, strict=True)
         named = tuple(name if self.after.fixed(argument) else sought for argument, name in own)
         if before or (isinstance(effect, ValueEffect) and not self.after.fixed(effect.value)):
             value = None  # the value is different for each member
-        return _Candidate(replace(effect, each=None, when=()), named, value, before)
+        return _Contribution(replace(effect, each=None, when=()), named, value, before)
 
-    def agrees(self, candidate: _Candidate, tuple_: Mapping[str, str]) -> Conjunction:
+    def agrees(self, candidate: _Contribution, tuple_: Mapping[str, str]) -> Conjunction:
         """Return the condition that a tuple is one of the tuples of a candidate."""
         effect = candidate.effect
-        found: list[Formula] = []
+        found: list[Simplified] = []
         if effect.each is not None:
             at = effect.arguments.index(effect.each.name)
             named = tuple_.get(candidate.named[at], candidate.named[at])
@@ -254,7 +254,7 @@ class _Keeping:
         candidate = self.candidates[number]
         effect = candidate.effect
         tuple_: dict[str, str] = {}
-        guard: list[Formula] = list(effect.when)
+        guard: list[Simplified] = list(effect.when)
         for own, name in zip(effect.arguments, candidate.named, strict=True):
             if name in self.names:
                 guard.append(self._put(tuple_, name, own))
@@ -276,7 +276,7 @@ class _Keeping:
                 others = [negation(self.agrees(one, whole)) for one in earlier if one.term is None]
                 yield from self._differences(whole, each, [*guard, *more, *others])
 
-    def _put(self, tuple_: dict[str, str], name: str, term: str) -> Formula:
+    def _put(self, tuple_: dict[str, str], name: str, term: str) -> Simplified:
         """Replace a variable of the aggregate by a term in `tuple_`, and return the conditions for this replacement."""
         if name in tuple_:
             return self.after.equal(tuple_[name], term)
@@ -285,12 +285,12 @@ class _Keeping:
 
     def _completed(
         self, tuple_: Mapping[str, str], each: Parameter | None
-    ) -> Iterator[tuple[dict[str, str], Parameter | None, list[Formula]]]:
+    ) -> Iterator[tuple[dict[str, str], Parameter | None, list[Simplified]]]:
         """Yield tuples with a term for every variable.
 
         The term for a variable is determined by a condition, or stands for each member of a class, or is each individual in turn.
         """
-        found, more = dict(tuple_), list[Formula]()
+        found, more = dict(tuple_), list[Simplified]()
         determined = True
         while determined:
             determined = False
@@ -317,7 +317,12 @@ class _Keeping:
             yield {**found, **dict(zip(left, row, strict=True))}, each, more
 
     def _changes(
-        self, effect: Effect, term: Term, tuple_: Mapping[str, str], each: Parameter | None, guard: Sequence[Formula]
+        self,
+        effect: Effect,
+        term: ScaledAmount,
+        tuple_: Mapping[str, str],
+        each: Parameter | None,
+        guard: Sequence[Simplified],
     ) -> Iterator[AmountEffect]:
         """Yield the effects on the total of a change of one amount, for tuples that contribute after the behaviour."""
         assert isinstance(effect, AmountEffect)
@@ -331,7 +336,7 @@ class _Keeping:
         yield from self._effects(tuple_, each, [(operation, by, [*guard, *_parts(fires), *always, *_parts(after)])])
 
     def _differences(
-        self, tuple_: Mapping[str, str], each: Parameter | None, guard: Sequence[Formula]
+        self, tuple_: Mapping[str, str], each: Parameter | None, guard: Sequence[Simplified]
     ) -> Iterator[AmountEffect]:
         """Yield the effects for tuples that begin to contribute, cease to contribute, or contribute another number."""
         always, before, after = self._contributing(tuple_)
@@ -345,7 +350,7 @@ class _Keeping:
                 found.append((*_difference(changed, amount), [*always, *when, *_parts(before), *_parts(after)]))
         yield from self._effects(tuple_, each, found)
 
-    def _contributing(self, tuple_: Mapping[str, str]) -> tuple[list[Formula], Conjunction, Conjunction]:
+    def _contributing(self, tuple_: Mapping[str, str]) -> tuple[list[Simplified], Conjunction, Conjunction]:
         """Return the conditions under which a tuple contributes.
 
         The three groups are constant conditions, conditions before the behaviour, and conditions after the behaviour.
@@ -358,7 +363,10 @@ class _Keeping:
         return always, before, both(map(self.after.condition, changing))
 
     def _effects(
-        self, tuple_: Mapping[str, str], each: Parameter | None, found: Iterable[tuple[str, Expression, list[Formula]]]
+        self,
+        tuple_: Mapping[str, str],
+        each: Parameter | None,
+        found: Iterable[tuple[str, Expression, list[Simplified]]],
     ) -> Iterator[AmountEffect]:
         """Yield the effects of a tuple on the total, except effects with contradictory conditions."""
         arguments = tuple(tuple_[name] for name in self.arguments)
@@ -377,7 +385,7 @@ def _signed(condition: Condition, wanted: bool = True) -> Iterator[tuple[Conditi
             yield from _signed(inner, wanted)
 
 
-def _parts(conjunction: Conjunction) -> Sequence[Formula]:
+def _parts(conjunction: Conjunction) -> Sequence[Simplified]:
     return (False,) if conjunction is None else conjunction
 
 

@@ -87,7 +87,7 @@ def totals(
     situations: Mapping[str, SituationType],
 ) -> dict[Symbol, str]:
     """Return the values of a sum or count for all of its arguments in a state, as texts of exact numbers."""
-    world = _World(classes, relations, state, situations)
+    world = _EnumeratedState(classes, relations, state, situations)
     kinds = [classes.get(p.kind, ()) for p in aggregate.parameters]
     found = {row: Fraction(0) for row in product(*kinds)}
     solutions = set[tuple[str, ...]]()
@@ -101,7 +101,7 @@ def totals(
     return {Symbol(aggregate.situation, row): written(number) for row, number in found.items()}
 
 
-class _World:
+class _EnumeratedState:
     """A state in which conditions are evaluated by enumeration of individuals."""
 
     def __init__(

@@ -71,7 +71,7 @@ class Meaning:
 
 
 @dataclass(frozen=True)
-class Reading:
+class ReadField:
     """A field in the robot's world model that contains the value of a symbol."""
 
     situation: str
@@ -92,7 +92,7 @@ class Interface:
     transport: str
     calls: Mapping[str, InterfaceCall]
     meanings: Mapping[str, Meaning]
-    readings: tuple[Reading, ...]
+    readings: tuple[ReadField, ...]
     robot_names: Mapping[str, str] = field(default_factory=dict)
     scene_query: str = ""
     attempts: int | None = None
@@ -137,7 +137,7 @@ def read_interface(store: ox.Store, names: Callable[[str], str], wanted: str) ->
             success == "true", code or status, (*known_so_far, names(situation)) if situation else known_so_far
         )
     readings = tuple(
-        Reading(names(situation), name, names(absent) if absent else None, step or None)
+        ReadField(names(situation), name, names(absent) if absent else None, step or None)
         for situation, name, absent, step in rows(store, READINGS % _literal(iri))
     )
     renamed = {names(node): name for node, name in rows(store, NAMES)}

@@ -12,7 +12,7 @@ from itertools import combinations
 
 import numpy as np
 
-from confab.reasoner.embodiment.solids import Block, blocks_of, body_blocks, fixture_block, overlap, place_frame
+from confab.reasoner.embodiment.solids import PlacedSolid, blocks_of, body_blocks, fixture_block, overlap, place_frame
 from confab.reasoner.embodiment.values import Embodiment, Flaw, Link, Mechanism
 from confab.reasoner.possible import PLACE
 from confab.reasoner.symbols import TRUE, State
@@ -26,7 +26,7 @@ DEEP = 0.0015
 SAMPLES = 33
 """Number of joint values at which the links are checked."""
 
-Met = tuple[float, float, Block, Block]
+Met = tuple[float, float, PlacedSolid, PlacedSolid]
 """Depth of an overlap in metres, the joint value, and the two solids."""
 
 
@@ -41,14 +41,14 @@ def through_a_solid(embodiment: Embodiment) -> Iterator[Flaw]:
             yield from _swept(mechanism, link, around)
 
 
-def _base_inside(mechanism: Mechanism, around: Sequence[Block]) -> Iterator[Flaw]:
+def _base_inside(mechanism: Mechanism, around: Sequence[PlacedSolid]) -> Iterator[Flaw]:
     """Yield, for each neighbouring body, its deepest overlap with the base of a mechanism."""
     base = [block for block in blocks_of(mechanism, {}) if block.owner == mechanism.name]
     for _, _, one, other in _deepest(_meeting(base, around, 0.0)):
         yield _flaw(one, other, overlap(one, other), "", f"move {mechanism.name} or {other.owner} apart")
 
 
-def _swept(mechanism: Mechanism, link: Link, around: Sequence[Block]) -> Iterator[Flaw]:
+def _swept(mechanism: Mechanism, link: Link, around: Sequence[PlacedSolid]) -> Iterator[Flaw]:
     """Yield, for each body that a link passes through, the deepest overlap."""
     taken = _taken_along(mechanism, link)
     values = np.linspace(link.lower, link.upper, SAMPLES) if link.kind != "fixed" else np.zeros(1)
@@ -79,7 +79,9 @@ def _swept(mechanism: Mechanism, link: Link, around: Sequence[Block]) -> Iterato
             yield _flaw(one, other, deep, where, remedy)
 
 
-def _still(mechanism: Mechanism, shut: Sequence[Block], link: Link, opened: Mapping[str, float]) -> Iterator[Block]:
+def _still(
+    mechanism: Mechanism, shut: Sequence[PlacedSolid], link: Link, opened: Mapping[str, float]
+) -> Iterator[PlacedSolid]:
     """Yield the solids of a mechanism that remain at rest while a link and its neighbours move."""
     taken = _taken_along(mechanism, link)
     return (block for block in shut if block.owner not in taken and block.owner not in opened)
@@ -94,7 +96,7 @@ def _taken_along(mechanism: Mechanism, link: Link) -> set[str]:
     return found
 
 
-def _meeting(ones: Sequence[Block], others: Sequence[Block], value: float) -> Iterator[Met]:
+def _meeting(ones: Sequence[PlacedSolid], others: Sequence[PlacedSolid], value: float) -> Iterator[Met]:
     """Yield the overlapping pairs of solids, with the depth of the overlap and the given joint value."""
     if not ones or not others:
         return
@@ -119,7 +121,7 @@ def _deepest(met: Iterator[Met] | Sequence[Met]) -> list[Met]:
     return list(found.values())
 
 
-def _flaw(one: Block, other: Block, deep: float, where: str, remedy: str) -> Flaw:
+def _flaw(one: PlacedSolid, other: PlacedSolid, deep: float, where: str, remedy: str) -> Flaw:
     return (
         one.part or one.owner,
         f"{one.name} is {deep * 1000:.0f} mm inside {other.name}{where}",
@@ -134,7 +136,7 @@ def overlapping_at_first(embodiment: Embodiment, initial: State) -> Iterator[Fla
     Two objects at the same place aren't yielded, because the rules on exclusive values report this fault.
     """
     where, values = _initially(embodiment, initial)
-    standing: dict[str, list[Block]] = {}
+    standing: dict[str, list[PlacedSolid]] = {}
     for name, place in where.items():
         frame = place_frame(embodiment, place, where, values)
         if frame is not None and name in embodiment.bodies:

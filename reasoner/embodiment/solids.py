@@ -26,7 +26,7 @@ REFINED = 24
 
 
 @dataclass(frozen=True)
-class Block:
+class PlacedSolid:
     """A box, cylinder or sphere in the world frame, with its `owner`.
 
     `half` contains the half extents of a box, or the radii of a round solid.
@@ -77,7 +77,7 @@ class Block:
         return found
 
 
-def overlap(one: Block, other: Block) -> float:
+def overlap(one: PlacedSolid, other: PlacedSolid) -> float:
     """Return the distance in metres by which a solid must be moved to be separated from another solid.
 
     The distance is negative if there is a gap between the solids.
@@ -138,7 +138,7 @@ def frames(mechanism: Mechanism, values: Mapping[str, float]) -> dict[str, Frame
     return found
 
 
-def blocks_of(mechanism: Mechanism, values: Mapping[str, float]) -> list[Block]:
+def blocks_of(mechanism: Mechanism, values: Mapping[str, float]) -> list[PlacedSolid]:
     """Return the solids of a mechanism for given joint values."""
     placed = frames(mechanism, values)
     owners: list[Mechanism | Link] = [mechanism, *mechanism.links]
@@ -149,18 +149,18 @@ def _solid(part: Part) -> bool:
     return part.kind != "mesh"
 
 
-def _placed(part: Part, owner: str, turned: Array, origin: Array) -> Block:
+def _placed(part: Part, owner: str, turned: Array, origin: Array) -> PlacedSolid:
     center = origin + turned @ np.array(part.position)
-    return Block(owner, part.name, part.kind, np.array(part.size) / 2, center, turned @ rotation(part.turned))
+    return PlacedSolid(owner, part.name, part.kind, np.array(part.size) / 2, center, turned @ rotation(part.turned))
 
 
-def fixture_block(fixture: Fixture) -> Block:
+def fixture_block(fixture: Fixture) -> PlacedSolid:
     """Return the solid of a fixture."""
     turned = rotation((0.0, 0.0, fixture.yaw))
-    return Block(fixture.name, "", "box", np.array(fixture.size) / 2, np.array(fixture.position), turned)
+    return PlacedSolid(fixture.name, "", "box", np.array(fixture.size) / 2, np.array(fixture.position), turned)
 
 
-def body_blocks(body: Body, frame: Frame) -> Iterator[Block]:
+def body_blocks(body: Body, frame: Frame) -> Iterator[PlacedSolid]:
     """Yield the solids of an object whose base has its centre at the given frame. A vessel is treated as solid throughout."""
     turned, base = frame
     numbers, shape = body.shape.numbers, body.shape
@@ -169,14 +169,14 @@ def body_blocks(body: Body, frame: Frame) -> Iterator[Block]:
         radius, half = (below + above) / 2 + wall, (high - low) / 2
         if half > 0.0005:
             center = base + turned[:, 2] * (low + high) / 2
-            yield Block(body.name, "", "cylinder", np.array([radius, radius, half]), center, turned)
+            yield PlacedSolid(body.name, "", "cylinder", np.array([radius, radius, half]), center, turned)
     if not shape.profile and "height" in numbers:
         half = numbers["height"] / 2
         if "radius" in numbers:
             size, kind = np.array([numbers["radius"], numbers["radius"], half]), "cylinder"
         else:
             size, kind = np.array([numbers["width"] / 2, numbers["depth"] / 2, half]), "box"
-        yield Block(body.name, "", kind, size, base + turned[:, 2] * half, turned)
+        yield PlacedSolid(body.name, "", kind, size, base + turned[:, 2] * half, turned)
 
 
 def place_frame(

@@ -27,8 +27,8 @@ from confab.reasoner.names import brief, nearest
 from confab.reasoner.vocabulary import CORE, OWL, PREFIXES, TYPE
 
 if TYPE_CHECKING:
-    from confab.reasoner.updates.compiling import Fault
-    from confab.reasoner.updates.texts import Place
+    from confab.reasoner.updates.compiling import UpdateFault
+    from confab.reasoner.updates.texts import TextPosition
 
 BASE = "urn:confab:graph:"
 GRAPHS = ("asserted", "inferred", "reach", "observed", "memory", "episodes")
@@ -108,7 +108,7 @@ class KnowledgeGraph:
     prefixes: dict[str, str] = field(default_factory=lambda: dict(PREFIXES))
     declared: dict[str, str] = field(default_factory=dict)
     faults: list[str] = field(default_factory=list)
-    written: dict[str, Place] = field(default_factory=dict)
+    written: dict[str, TextPosition] = field(default_factory=dict)
     remote: Remote | None = None
     round_trips: int = 0
 
@@ -213,7 +213,7 @@ def load(
     source: str | Path | Sequence[str | Path],
     store: ox.Store | None = None,
     tolerant: bool = False,
-    faults: list[Fault] | None = None,
+    faults: list[UpdateFault] | None = None,
 ) -> KnowledgeGraph:
     """Load a scene with all its imports, and its file of reachability facts if it exists.
 
@@ -226,7 +226,7 @@ def load(
         An empty store for the triples; by default a new store in memory.
     tolerant : bool
         Whether to load an RDF file even if it isn't a complete scene; the attribute `faults` of the graph then has the reasons.
-    faults : list of Fault, optional
+    faults : list of UpdateFault, optional
         A list that receives the faults in behaviours that are written as updates. Without this list, a fault raises an error.
 
     Raises
@@ -248,7 +248,7 @@ def load(
     return graph
 
 
-def write_out(graph: KnowledgeGraph) -> list[Fault]:
+def write_out(graph: KnowledgeGraph) -> list[UpdateFault]:
     """Compile the updates and queries of behaviours and rules into individuals, and return the faults in these texts."""
     texts = [ox.NamedNode(CORE + name) for name in ("update", "extends", "construct")]
     if not any(next(graph.store.quads_for_pattern(None, text, None, None), None) for text in texts):
@@ -385,7 +385,7 @@ def read_into(graph: KnowledgeGraph, file: Path, name: str) -> None:
     check(f"reading {file}")
     target = ox.NamedNode(BASE + name)
     with readable(file) as (content, form):
-        timed = _Timed(content, f"reading {file}")
+        timed = _TimedInput(content, f"reading {file}")
         if form.supports_datasets:  # all graphs of the file become one graph
             quads = ox.parse(timed, format=form, base_iri=file.resolve().as_uri())
             graph.store.extend(ox.Quad(quad.subject, quad.predicate, quad.object, target) for quad in quads)
@@ -396,7 +396,7 @@ def read_into(graph: KnowledgeGraph, file: Path, name: str) -> None:
         read_prefixes(graph, file)
 
 
-class _Timed(BytesIO):
+class _TimedInput(BytesIO):
     """A byte stream that raises `LimitError` at the deadline, so that a parser stops reading."""
 
     def __init__(self, content: bytes, doing: str) -> None:

@@ -65,7 +65,7 @@ SERVICE = re.compile(r"(?<![\w?$:-])SERVICE(?![\w:-])", re.IGNORECASE)
 
 Dataset: TypeAlias = "tuple[Sequence[str], Sequence[str] | None]"
 """The graphs whose union is the default graph, and the graphs that ``GRAPH`` can match (None: all graphs)."""
-Answer: TypeAlias = "tuple[str, list[str], Any]"
+QueryAnswer: TypeAlias = "tuple[str, list[str], Any]"
 """The kind of result (``rows``, ``triples`` or ``truth``), the column names, and the content."""
 
 
@@ -82,7 +82,7 @@ class QueryLimits:
     service: bool = False
 
 
-def ask(graph: KnowledgeGraph, query: str, limits: QueryLimits | None = None) -> Answer:
+def ask(graph: KnowledgeGraph, query: str, limits: QueryLimits | None = None) -> QueryAnswer:
     """Return the result of a query on the union of a knowledge graph's graphs.
 
     Raises
@@ -99,7 +99,7 @@ def ask(graph: KnowledgeGraph, query: str, limits: QueryLimits | None = None) ->
         return worker.ask(query)
 
 
-class _Checked(BytesIO):
+class _TimedOutput(BytesIO):
     """A byte stream that raises `LimitError` at the deadline, so that a store stops writing."""
 
     def write(self, content: Buffer, /) -> int:
@@ -109,7 +109,7 @@ class _Checked(BytesIO):
 
 
 def _dumped(graph: KnowledgeGraph) -> bytes:
-    written = _Checked()
+    written = _TimedOutput()
     graph.store.dump(written, format=ox.RdfFormat.N_QUADS)
     return written.getvalue()
 
@@ -162,7 +162,7 @@ class QueryWorker:
             self._send(None)
             self._sending.release()
 
-    def ask(self, query: str, dataset: Dataset | None = None) -> Answer:
+    def ask(self, query: str, dataset: Dataset | None = None) -> QueryAnswer:
         """Return the result of a query on a dataset: by default the dataset of its ``FROM`` clauses, or the union of all graphs.
 
         Raise the errors of the function `ask`, and `KnowledgeError` for a graph that doesn't exist.
@@ -174,7 +174,7 @@ class QueryWorker:
             found = self._answer(query, dataset)  # the original query, for correct positions in messages
         return _checked(self.graph, query, self.limits, found)
 
-    def _answer(self, query: str, dataset: Dataset) -> Answer:
+    def _answer(self, query: str, dataset: Dataset) -> QueryAnswer:
         late, starting, deadline = Event(), self._process is None, current()
 
         def interrupt() -> None:
@@ -208,7 +208,7 @@ class QueryWorker:
             if late.is_set() and deadline.left == 0:
                 deadline.check("answering a query")
             raise self._why(found[1], found[2], late.is_set())
-        answer: Answer = found
+        answer: QueryAnswer = found
         return answer
 
     def _setup(self) -> dict[str, object]:
@@ -277,7 +277,7 @@ def _existing(graph: KnowledgeGraph, dataset: Dataset) -> Dataset:
     return dataset
 
 
-def _checked(graph: KnowledgeGraph, query: str, limits: QueryLimits, found: Answer) -> Answer:
+def _checked(graph: KnowledgeGraph, query: str, limits: QueryLimits, found: QueryAnswer) -> QueryAnswer:
     """Return the result of a query; raise the exception for an error that the process reports."""
     if found[0] == "too many":
         raise LimitError(
@@ -371,7 +371,7 @@ def standing_alone(graph: KnowledgeGraph, query: str) -> str:
     return "\n".join([*lines, query])
 
 
-def _remotely(graph: KnowledgeGraph, query: str, limits: QueryLimits) -> Answer:
+def _remotely(graph: KnowledgeGraph, query: str, limits: QueryLimits) -> QueryAnswer:
     assert graph.remote is not None
     graph.round_trips += 1
     answer = graph.remote.query(query, graph.prefixes, {}, noted=False)

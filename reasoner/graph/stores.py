@@ -61,7 +61,7 @@ SELECT DISTINCT ?graph ?ontology ?import WHERE {
 
 
 @dataclass
-class Endpoint:
+class RemoteEndpoint:
     """A SPARQL 1.1 endpoint that is queried by POST requests.
 
     Parameters
@@ -231,7 +231,7 @@ def connect(url: str, scene: str | None = None, *, timeout: float = TIMEOUT, ret
     scene : str, optional
         IRI of the scene; required if the endpoint contains several scenes.
     timeout, retries
-        See `Endpoint`. The Authorization header is read from the environment variable `AUTHORIZATION`.
+        See `RemoteEndpoint`. The Authorization header is read from the environment variable `AUTHORIZATION`.
 
     Raises
     ------
@@ -239,7 +239,7 @@ def connect(url: str, scene: str | None = None, *, timeout: float = TIMEOUT, ret
         A query fails as in `Endpoint.query`, or the endpoint doesn't contain the given scene. If no scene is given, the endpoint
         contains no scene or several scenes.
     """
-    endpoint = Endpoint(url, os.environ.get(AUTHORIZATION), timeout, retries)
+    endpoint = RemoteEndpoint(url, os.environ.get(AUTHORIZATION), timeout, retries)
     graph = KnowledgeGraph("", remote=endpoint)
     imports: dict[str, set[str]] = {}
     places: dict[str, set[str | None]] = {}

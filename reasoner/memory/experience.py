@@ -11,7 +11,7 @@ Experience  all learned items, with grow-only tallies by replica and epoch, whic
 ==========  ===================================================================================================
 
 Rules, orders, methods and kinds of goals are named by a hash of their content. Equal items therefore have equal names in all
-replicas, and a union of replicas merges equal items. An item has one tally per lifted fact (`Fact`). The tally of the empty fact
+replicas, and a union of replicas merges equal items. An item has one tally per `RoleFact`. The tally of the empty fact
 counts all uses of the item; the tally of another fact counts only uses in which the individuals in the item's roles satisfied the
 fact. The weight of tallies of epoch 0 never decays. Each further epoch belongs to one episode of a replica. The tallies of a
 further epoch are preferences between individuals, for example between two hands; their weight decays with every later episode.
@@ -30,11 +30,11 @@ from confab.reasoner.symbols import Fact as Goal
 
 Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
 """A behaviour and its arguments."""
-Fact: TypeAlias = "tuple[str, str]"
+RoleFact: TypeAlias = "tuple[str, str]"
 """A question about the individuals in the roles of an item, and the answer. For the tally of all uses of an item, both the question
 and the answer are the empty text.
 """
-ITSELF: Fact = ("", "")
+ITSELF: RoleFact = ("", "")
 
 
 class LearningError(ValueError):
@@ -79,7 +79,7 @@ class LearnedRule:
 
 
 @dataclass(frozen=True)
-class Order:
+class LearnedOrder:
     """A learned order: goals of one situation type are achieved before goals of another situation type.
 
     `first` is the situation type of the goals that are achieved first, and `then` is the situation type of the other goals.
@@ -97,7 +97,7 @@ class Order:
         return _named("order", (self.first, self.then, self.shared))
 
     @classmethod
-    def of(cls, first: Goal, then: Goal, constants: frozenset[str]) -> Order:
+    def of(cls, first: Goal, then: Goal, constants: frozenset[str]) -> LearnedOrder:
         """Return the learned order of two goals.
 
         The order records the positions of the individuals that both goals contain, except `constants`.
@@ -107,9 +107,9 @@ class Order:
         return cls(first.symbol.situation, then.symbol.situation, tuple(shared))
 
     @property
-    def reversed(self) -> Order:
+    def reversed(self) -> LearnedOrder:
         """The opposite order."""
-        return Order(self.then, self.first, tuple(sorted((j, i) for i, j in self.shared)))
+        return LearnedOrder(self.then, self.first, tuple(sorted((j, i) for i, j in self.shared)))
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ class GoalKind:
         return _named("goals", (self.situation, self.classes))
 
 
-Said: TypeAlias = "LearnedRule | Order | Method | GoalKind"
+LearnedItem: TypeAlias = "LearnedRule | LearnedOrder | Method | GoalKind"
 
 
 @dataclass(frozen=True)
@@ -182,7 +182,7 @@ DIGITS = 6
 
 
 @dataclass(frozen=True, order=True)
-class Measured:
+class MeasuredDuration:
     """The measured durations of a behaviour: the number of executions, and the mean and standard deviation in seconds."""
 
     count: int
@@ -190,7 +190,7 @@ class Measured:
     spread: float = 0.0
 
     @classmethod
-    def of(cls, seconds: Sequence[float]) -> Measured:
+    def of(cls, seconds: Sequence[float]) -> MeasuredDuration:
         """Return the statistics of one or more durations.
 
         >>> Measured.of([1.0, 2.0, 3.0])
@@ -200,7 +200,7 @@ class Measured:
         squares = sum((one - mean) ** 2 for one in seconds)
         return cls(len(seconds), round(mean, DIGITS), round(sqrt(squares / max(len(seconds) - 1, 1)), DIGITS))
 
-    def __add__(self, other: Measured) -> Measured:
+    def __add__(self, other: MeasuredDuration) -> MeasuredDuration:
         """Return the joint statistics of two disjoint sets of executions.
 
         >>> Measured.of([1.0]) + Measured.of([2.0, 3.0]) == Measured.of([1.0, 2.0, 3.0])
@@ -210,10 +210,10 @@ class Measured:
         squares = sum(one.spread**2 * (one.count - 1) for one in (self, other))
         squares += apart**2 * self.count * other.count / count
         mean = self.mean + apart * other.count / count
-        return Measured(count, round(mean, DIGITS), round(sqrt(squares / (count - 1)), DIGITS))
+        return MeasuredDuration(count, round(mean, DIGITS), round(sqrt(squares / (count - 1)), DIGITS))
 
 
-Statistics: TypeAlias = "Mapping[tuple[str, str], Measured]"
+Statistics: TypeAlias = "Mapping[tuple[str, str], MeasuredDuration]"
 """Measured durations by behaviour and actor; an empty name of the actor stands for all actors."""
 
 
@@ -226,9 +226,9 @@ def duration_name(key: tuple[str, str]) -> str:
 class Lesson:
     """The items that were learned in one episode, with their tallies; `personal` contains preferences between individuals."""
 
-    said: list[Said] = field(default_factory=list)
-    counted: list[tuple[Said, Fact, Tally]] = field(default_factory=list)
-    personal: list[tuple[Said, Fact, Tally]] = field(default_factory=list)
+    said: list[LearnedItem] = field(default_factory=list)
+    counted: list[tuple[LearnedItem, RoleFact, Tally]] = field(default_factory=list)
+    personal: list[tuple[LearnedItem, RoleFact, Tally]] = field(default_factory=list)
 
     def __iadd__(self, other: Lesson) -> Lesson:
         """Add another lesson of the same episode."""
@@ -238,7 +238,7 @@ class Lesson:
         return self
 
 
-Counts: TypeAlias = "dict[str, dict[Fact, Tally]]"
+Tallies: TypeAlias = "dict[str, dict[RoleFact, Tally]]"
 
 
 @dataclass
@@ -257,7 +257,7 @@ class Experience:
         Other replicas whose experience is used for planning.
     disabled : set of name
         Learned items that aren't used for planning.
-    durations : mapping of replica to (behaviour, actor) to Measured
+    durations : mapping of replica to (behaviour, actor) to MeasuredDuration
 
     Examples
     --------
@@ -271,11 +271,11 @@ class Experience:
 
     replica: str
     episodes: dict[str, int] = field(default_factory=dict)
-    said: dict[str, Said] = field(default_factory=dict)
-    counts: dict[tuple[str, int], Counts] = field(default_factory=dict)
+    said: dict[str, LearnedItem] = field(default_factory=dict)
+    counts: dict[tuple[str, int], Tallies] = field(default_factory=dict)
     trusts: set[str] = field(default_factory=set)
     disabled: set[str] = field(default_factory=set)
-    durations: dict[str, dict[tuple[str, str], Measured]] = field(default_factory=dict)
+    durations: dict[str, dict[tuple[str, str], MeasuredDuration]] = field(default_factory=dict)
 
     def learn(self, lesson: Lesson) -> None:
         """Add the lesson of one episode."""
@@ -295,7 +295,7 @@ class Experience:
 
     def statistics(self, replicas: Collection[str]) -> Statistics:
         """Return the durations that some replicas measured, except disabled durations."""
-        found: dict[tuple[str, str], Measured] = {}
+        found: dict[tuple[str, str], MeasuredDuration] = {}
         for replica, known in self.durations.items():
             for key, one in known.items():
                 if replica in replicas and duration_name(key) not in self.disabled:
@@ -317,21 +317,21 @@ class Experience:
             mine = self.durations.setdefault(replica, {})
             mine.update({key: max(one, mine.get(key, one)) for key, one in known.items()})
 
-    def totals(self) -> Counts:
+    def totals(self) -> Tallies:
         """Return the tallies of epoch 0, summed over all replicas, by name and fact."""
-        found: Counts = {}
+        found: Tallies = {}
         for (_, epoch), name, fact, tally in self:
             if epoch == 0:
                 table = found.setdefault(name, {})
                 table[fact] = table.get(fact, Tally()) + tally
         return found
 
-    def preferences(self, decay: float) -> dict[str, dict[Fact, tuple[float, float]]]:
+    def preferences(self, decay: float) -> dict[str, dict[RoleFact, tuple[float, float]]]:
         """Return weighted numbers of choices and rejections by name and fact.
 
         Every later episode multiplies the weights by `decay`.
         """
-        found: dict[str, dict[Fact, tuple[float, float]]] = {}
+        found: dict[str, dict[RoleFact, tuple[float, float]]] = {}
         for (replica, epoch), name, fact, tally in self:
             if epoch:
                 weight = decay ** (self.episodes.get(replica, epoch) - epoch)
@@ -340,7 +340,7 @@ class Experience:
                 table[fact] = chosen + weight * tally.chosen, passed + weight * (tally.passed_over + tally.failed)
         return found
 
-    def __iter__(self) -> Iterator[tuple[tuple[str, int], str, Fact, Tally]]:
+    def __iter__(self) -> Iterator[tuple[tuple[str, int], str, RoleFact, Tally]]:
         """Yield each tally with its replica and epoch, the name of its item, and its fact."""
         for who, counts in self.counts.items():
             for name, facts in counts.items():

@@ -29,7 +29,16 @@ import pyoxigraph as ox
 
 from confab.reasoner.files import write_whole
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.memory.experience import DIGITS, ITSELF, Experience, Fact, Measured, Said, Tally, duration_name
+from confab.reasoner.memory.experience import (
+    DIGITS,
+    ITSELF,
+    Experience,
+    LearnedItem,
+    MeasuredDuration,
+    RoleFact,
+    Tally,
+    duration_name,
+)
 from confab.reasoner.memory.rules_file import RuleReader, RuleWriter, Words, label
 from confab.reasoner.names import Names
 from confab.reasoner.vocabulary import CORE, MEMORY, OWL, RDFS
@@ -73,11 +82,11 @@ PAPER = re.compile(r"^((?:(?:_:link\d+|<[^>\s]+\.memory#[^>\s]+>) <[^\n]* \.\n)+
 
 
 @dataclass(frozen=True)
-class Lines:
+class MemoryLines:
     """The parts of a memory file: links with tallies, lifted facts by name, knowledge links, and all other lines as Turtle."""
 
     links: list[tuple[str, str, Tally]] = field(default_factory=list)
-    facts: dict[str, Fact] = field(default_factory=dict)
+    facts: dict[str, RoleFact] = field(default_factory=dict)
     rest: str = ""
     paper: str = ""
 
@@ -93,7 +102,7 @@ def no_such_file(path: Path) -> KnowledgeError:
     return KnowledgeError(f"{path}: no such memory file; 'confab learn' makes one{several}")
 
 
-def lines(text: str) -> Lines:
+def lines(text: str) -> MemoryLines:
     """Split the text of a memory file into its parts."""
     links, facts, rest, at = [], {}, list[str](), 0
     parts = PAPER.split(text)
@@ -107,7 +116,7 @@ def lines(text: str) -> Lines:
             facts[fact] = asks, answer
         else:
             links.append((counter, about, Tally(*map(int, counts))))
-    return Lines(links, facts, "".join([*rest, text[at:]]), "".join(parts[1::2]))
+    return MemoryLines(links, facts, "".join([*rest, text[at:]]), "".join(parts[1::2]))
 
 
 def new_replica() -> str:
@@ -165,7 +174,7 @@ def turtle(
     writer = RuleWriter(names, words)
     for name, one in sorted(experience.said.items()):
         yield writer.said(one, name not in experience.disabled)
-    facts: dict[Fact, str] = {}
+    facts: dict[RoleFact, str] = {}
     for (replica, epoch), counts in sorted(experience.counts.items()):
         if only not in (None, replica):
             continue
@@ -233,7 +242,7 @@ def load(path: Path, names: Names | None = None) -> Experience:
     return parse(lines(text), str(path), names)
 
 
-def parse(found: Lines, source: str, names: Names | None = None) -> Experience:
+def parse(found: MemoryLines, source: str, names: Names | None = None) -> Experience:
     """Return the experience in the parts of a memory file; `source` names the file in messages."""
     try:
         triples = found.triples
@@ -242,7 +251,7 @@ def parse(found: Lines, source: str, names: Names | None = None) -> Experience:
     return _experience(triples, found, source, names)
 
 
-def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: Names | None) -> Experience:
+def _experience(triples: Iterable[ox.Triple], found: MemoryLines, source: str, names: Names | None) -> Experience:
     links, facts = list(found.links), dict(found.facts)
     nodes: dict[str, dict[str, list[str]]] = {}
     for triple in triples:
@@ -267,7 +276,7 @@ def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: 
     try:
         named: dict[str, str] = {}  # an edited rule has another name, but keeps its tallies
         for subject, node in nodes.items():
-            one: Said | None = reader.said(subject)
+            one: LearnedItem | None = reader.said(subject)
             if one is not None:
                 named[_local(subject)] = one.name
                 experience.said[one.name] = one
@@ -285,7 +294,7 @@ def _experience(triples: Iterable[ox.Triple], found: Lines, source: str, names: 
                 links.append((counter, target, Tally(*(int(node.get(key, ["0"])[0]) for key in TALLY))))
             if "asks" in node:
                 facts[_local(subject)] = reader.one(subject, "asks"), reader.one(subject, "answer")
-        counters: dict[str, dict[Fact, Tally]] = {}
+        counters: dict[str, dict[RoleFact, Tally]] = {}
         for subject, node in nodes.items():
             if "epoch" in node:
                 who = reader.one(subject, "replica"), _count(reader.one(subject, "epoch"), "epoch")
@@ -324,7 +333,7 @@ def _durations(experience: Experience, reader: RuleReader) -> None:
         actor = reader.short(reader.one(target, "byActor")) if "byActor" in statistic else ""
         key = reader.short(reader.one(subject, OWL + "annotatedSource")), actor
         count = _count(reader.one(subject, "count"), "count")
-        one = Measured(count, *(round(float(reader.one(subject, part)), DIGITS) for part in ("mean", "spread")))
+        one = MeasuredDuration(count, *(round(float(reader.one(subject, part)), DIGITS) for part in ("mean", "spread")))
         if not count or not (isfinite(one.mean + one.spread) and min(one.mean, one.spread) >= 0):
             raise ValueError(
                 f"{' '.join(key)} lasts {one}; wanted a count from 1 on, and a mean and a spread from 0 on"
@@ -365,7 +374,7 @@ def pull(endpoint: str, names: Names | None = None, replica: str | None = None, 
     triples = [q.triple for q in ox.parse(answer, format=ox.RdfFormat.N_TRIPLES)]
     if not triples:
         return Experience(own)
-    found = _experience(triples, Lines(), endpoint, names)
+    found = _experience(triples, MemoryLines(), endpoint, names)
     found.replica = own
     return found
 

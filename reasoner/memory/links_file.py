@@ -16,7 +16,7 @@ import pyoxigraph as ox
 
 from confab.reasoner.files import write_whole
 from confab.reasoner.graph.knowledge import BASE, KnowledgeError, KnowledgeGraph, text
-from confab.reasoner.memory.experience_file import Lines, lines, no_such_file
+from confab.reasoner.memory.experience_file import MemoryLines, lines, no_such_file
 from confab.reasoner.memory.links import Links
 from confab.reasoner.names import Names
 from confab.reasoner.nesting import MOST_NESTED, nested
@@ -35,7 +35,7 @@ SELECT ?behavior ?fact ?probability WHERE {
 } ORDER BY ?behavior ?fact"""
 
 
-def load_links(path: Path, names: Names, found: Lines | None = None) -> Links:
+def load_links(path: Path, names: Names, found: MemoryLines | None = None) -> Links:
     """Return the knowledge links in a memory file.
 
     Parameters
@@ -43,7 +43,7 @@ def load_links(path: Path, names: Names, found: Lines | None = None) -> Links:
     path : Path
     names : Names
         The scene's names; a term that the scene doesn't contain is named by the last part of its IRI.
-    found : Lines, optional
+    found : MemoryLines, optional
         The result of `memory_lines` for the file, if this result is known already.
 
     Raises
@@ -71,7 +71,7 @@ def load_links(path: Path, names: Names, found: Lines | None = None) -> Links:
     return links
 
 
-def memory_names(path: Path, found: Lines | None = None) -> tuple[str, Names]:
+def memory_names(path: Path, found: MemoryLines | None = None) -> tuple[str, Names]:
     """Return the IRI of the scene that a memory file imports, and short names for the terms in the file.
 
     Raises
@@ -119,7 +119,7 @@ def links_text(links: Links, names: Names, scene: str) -> str:
     return (ox.serialize(triples, format=ox.RdfFormat.N_TRIPLES) or b"").decode("utf-8")
 
 
-def memory_lines(path: Path) -> Lines:
+def memory_lines(path: Path) -> MemoryLines:
     """Read a memory file and split the text into its parts.
 
     Raises
@@ -140,7 +140,7 @@ def memory_lines(path: Path) -> Lines:
         raise KnowledgeError(f"{path}: can't be read: {error.strerror or error}") from error
 
 
-def _graph(path: Path, found: Lines | None = None) -> KnowledgeGraph:
+def _graph(path: Path, found: MemoryLines | None = None) -> KnowledgeGraph:
     """Return the triples of a memory file, except tallies."""
     found = found or memory_lines(path)
     rest = found.rest + found.paper

@@ -14,23 +14,23 @@ from urllib.parse import quote, unquote
 
 import pyoxigraph as ox
 
-from confab.reasoner.condition_nodes import Node, NodeReader, NodeWriter
-from confab.reasoner.memory.experience import GoalKind, LearnedRule, Method, OpenRole, Order, Said
+from confab.reasoner.condition_nodes import NodeReader, NodeValues, NodeWriter
+from confab.reasoner.memory.experience import GoalKind, LearnedItem, LearnedOrder, LearnedRule, Method, OpenRole
 from confab.reasoner.names import Names
 from confab.reasoner.symbols import FALSE, TRUE, Condition, ValueCondition
 from confab.reasoner.vocabulary import ARGUMENTS, CORE, MEMORY, RDF
 
-Words: TypeAlias = "Callable[[Said], str]"
+Words: TypeAlias = "Callable[[LearnedItem], str]"
 T = TypeVar("T")
 
 
-def label(one: Said) -> str:
+def label(one: LearnedItem) -> str:
     """Return a short description of a learned item."""
     match one:
         case LearnedRule(goal, _, does):
             wanted = " ".join((*goal.arguments[:1], goal.situation, *goal.arguments[1:], goal.value))
             return f"for {wanted}: {' '.join((does[0], *does[1]))}".replace("?", "")
-        case Order(first, then, shared):
+        case LearnedOrder(first, then, shared):
             return f"{first} before {then}" + (" of the same" if shared else "")
         case Method(behavior, _, steps, _):
             return f"{behavior} by {', '.join(name for name, _ in steps)}"
@@ -51,13 +51,13 @@ class RuleWriter:
             return str(ox.NamedNode(self.names.iri(name)))
         return f":{name}" if name in (TRUE, FALSE) else str(ox.NamedNode(MEMORY + quote(name, safe="")))
 
-    def said(self, one: Said, enabled: bool = True) -> str:
+    def said(self, one: LearnedItem, enabled: bool = True) -> str:
         """Return the Turtle statements of a learned item and its parts."""
         me = f"m:{one.name}"
         match one:
             case LearnedRule():
                 kind, lines = "LearnedRule", self.rule(one, me)
-            case Order(first, then, shared):
+            case LearnedOrder(first, then, shared):
                 pairs = "".join(f' ; :shares "{i} {j}"' for i, j in shared)
                 kind, lines = "LearnedOrder", [f":first {self.term(first)} ; :then {self.term(then)}{pairs}"]
             case Method():
@@ -130,7 +130,7 @@ class _RuleNodes(NodeWriter):
 class RuleReader(NodeReader):
     """Reader of learned items from the triples of a file; core properties in `nodes` have no namespace."""
 
-    def __init__(self, nodes: Mapping[str, Node], names: Names | None) -> None:
+    def __init__(self, nodes: Mapping[str, NodeValues], names: Names | None) -> None:
         self.nodes, self.names = nodes, names
         self.roles: Mapping[str, str] = {}  # the names of a rule's roles, by their IRIs
         self.inside, self.count = [], [0]
@@ -157,7 +157,7 @@ class RuleReader(NodeReader):
             return self.names.short(iri)
         return iri.rsplit("#", 1)[-1].rsplit("/", 1)[-1]
 
-    def said(self, iri: str) -> Said | None:
+    def said(self, iri: str) -> LearnedItem | None:
         """Return the learned item of a node, or None for another node; raise `ValueError` if a part is missing."""
         node = self.nodes[iri]
         kinds = [kind.removeprefix(CORE) for kind in node.get(RDF + "type", ())]
@@ -166,14 +166,14 @@ class RuleReader(NodeReader):
         if "LearnedOrder" in kinds:
             pairs = [text.split() for text in node.get("shares", ())]
             shared = sorted((int(i), int(j)) for i, j in pairs)
-            return Order(self.short(self.one(iri, "first")), self.short(self.one(iri, "then")), tuple(shared))
+            return LearnedOrder(self.short(self.one(iri, "first")), self.short(self.one(iri, "then")), tuple(shared))
         if "LearnedMethod" in kinds:
             return self.method(iri, node)
         if "GoalKind" in kinds:
             return GoalKind(self.short(self.one(iri, "situationType")), self.arguments(iri))
         return None
 
-    def rule(self, iri: str, node: Node) -> LearnedRule:
+    def rule(self, iri: str, node: NodeValues) -> LearnedRule:
         """Return the rule of a node."""
         roles = sorted(node.get("role", ()), key=lambda role: (int(self.one(role, "index")), role))
         terms = {role: "?" + unquote(role.removeprefix(iri + ".")) for role in roles}
@@ -192,7 +192,7 @@ class RuleReader(NodeReader):
         """Return the IRIs of a node's arguments, in order."""
         return [value for name in ARGUMENTS for value in self.values(iri, name)[:1]]
 
-    def method(self, iri: str, node: Node) -> Method:
+    def method(self, iri: str, node: NodeValues) -> Method:
         """Return the method of a node."""
         own = int(self.one(iri, "roles"))
         opened = sorted(node.get("role", ()), key=lambda role: int(self.one(role, "index")))

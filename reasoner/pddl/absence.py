@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from confab.reasoner.pddl.formulas import Atom, Term
-from confab.reasoner.pddl.vocabulary import Vocabulary
+from confab.reasoner.pddl.formulas import Atom, PddlTerm
+from confab.reasoner.pddl.vocabulary import PddlNames
 from confab.reasoner.symbols import Behavior, Condition, Problem, ValueCondition, Witness
 
 
-class Kept:
+class NegationPredicates:
     """The extra predicates that an export declares for the negative preconditions of its behaviours.
 
     `contrary` maps a situation type to values; for each of these values, the export needs a predicate ``not_TYPE``, whose arguments
@@ -17,7 +17,7 @@ class Kept:
     time; for each of these values, the export needs only a predicate ``no_CLASS_has_TYPE``, whose argument is the value.
     """
 
-    def __init__(self, problem: Problem, behaviors: Sequence[Behavior], words: Vocabulary) -> None:
+    def __init__(self, problem: Problem, behaviors: Sequence[Behavior], words: PddlNames) -> None:
         self.problem, self.behaviors, self.words = problem, behaviors, words
         self.contrary: dict[str, set[str]] = {}
         self.free: dict[tuple[str, str], frozenset[str]] = {}
@@ -77,13 +77,13 @@ class Kept:
                 return False
         return True
 
-    def lacks(self, situation: str, terms: tuple[Term, ...], value: Term) -> Atom:
+    def lacks(self, situation: str, terms: tuple[PddlTerm, ...], value: PddlTerm) -> Atom:
         """Return the atom of ``not_TYPE``: the symbol doesn't have the value."""
         words = self.words
         name = words.name("predicate", f"not {situation}", f"not_{situation}")
         return words.atom(name, (*words.about(situation, terms), value))
 
-    def none_has(self, kind: str, situation: str, value: Term) -> Atom:
+    def none_has(self, kind: str, situation: str, value: PddlTerm) -> Atom:
         """Return the atom of ``no_CLASS_has_TYPE``: no individual of the class has the value."""
         name = self.words.name("predicate", f"free {kind} {situation}", f"no_{kind}_has_{situation}")
         return self.words.atom(name, (value,))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 from confab.reasoner.pddl.durative import Durative
-from confab.reasoner.pddl.words import Form, Word
+from confab.reasoner.pddl.words import Form, PddlWord
 
 COMPARISONS = ("<", "<=", "=", ">=", ">")
 CHANGES = ("assign", "increase", "decrease", "scale-up", "scale-down")
@@ -19,7 +19,7 @@ class Typed:
 
     name: str
     type: str
-    place: Word
+    place: PddlWord
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Action:
     parameters: tuple[Typed, ...]
     precondition: Form | None
     effect: Form | None
-    place: Word
+    place: PddlWord
     durative: Durative | None = None
 
 

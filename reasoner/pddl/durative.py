@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from confab.reasoner.pddl.words import Form, Word
+from confab.reasoner.pddl.words import Form, PddlWord
 
 SPANS = {("at", "start"): "start", ("over", "all"): "all", ("at", "end"): "end"}
 DURATION = "?duration"
@@ -21,7 +21,7 @@ DURATION = "?duration"
 class Durative:
     """The duration, conditions and effects of a durative action; each condition and effect has the time `start`, `all` or `end`."""
 
-    duration: Word | Form
+    duration: PddlWord | Form
     conditions: tuple[tuple[str, Form], ...]
     effects: tuple[tuple[str, Form], ...]
 
@@ -29,22 +29,22 @@ class Durative:
 class NotTimedError(ValueError):
     """Raised if a part of a durative action states no time or an unsupported time; `at` is the part's position in the text."""
 
-    def __init__(self, at: Word | Form, text: str) -> None:
+    def __init__(self, at: PddlWord | Form, text: str) -> None:
         super().__init__(text)
         self.at = at
 
 
-def duration_in(form: Form) -> Word | Form:
+def duration_in(form: Form) -> PddlWord | Form:
     """Return the number or expression that a ``:duration`` form states; return the lower bound if the form states only bounds."""
     if form.head == "at" and len(form.items) == 3 and isinstance(form.items[2], Form):  # (at start (= ?duration …))
         return duration_in(form.items[2])
     bounds = [form] if form.head != "and" else [one for one in form.items[1:] if isinstance(one, Form)]
-    found: dict[str, Word | Form] = {}
+    found: dict[str, PddlWord | Form] = {}
     for one in bounds:
         if (
             one.head not in ("=", "<=", ">=")
             or len(one.items) != 3
-            or not (isinstance(one.items[1], Word) and one.items[1].text == DURATION)
+            or not (isinstance(one.items[1], PddlWord) and one.items[1].text == DURATION)
         ):
             raise NotTimedError(one, "wanted (= ?duration …), or bounds by (>= ?duration …) and (<= ?duration …)")
         found.setdefault(one.head, one.items[2])
@@ -54,11 +54,11 @@ def duration_in(form: Form) -> Word | Form:
     return chosen
 
 
-def timed(form: Form | None, what: str, duration: Word | Form) -> Iterator[tuple[str, Form]]:
+def timed(form: Form | None, what: str, duration: PddlWord | Form) -> Iterator[tuple[str, Form]]:
     """Yield the time and the form of each condition or effect of a durative action; `duration` replaces ``?duration``."""
     if form is None or not form.items:
         return
-    words = tuple(item.text for item in form.items[:2] if isinstance(item, Word))
+    words = tuple(item.text for item in form.items[:2] if isinstance(item, PddlWord))
     if form.head == "and":
         for item in form.items[1:]:
             if not isinstance(item, Form):
@@ -105,7 +105,7 @@ def whole(parts: Durative, place: Form) -> tuple[Form | None, Form | None]:
 
 
 def _both(forms: list[Form], place: Form) -> Form:
-    return Form((Word("and", place.line, place.column), *forms), place.line, place.column)
+    return Form((PddlWord("and", place.line, place.column), *forms), place.line, place.column)
 
 
 def _conjuncts(form: Form) -> Iterator[Form]:
@@ -127,11 +127,11 @@ def _atom(form: Form) -> Form:
     return inner if isinstance(inner, Form) else form
 
 
-def _text(form: Word | Form) -> str:
-    return form.text if isinstance(form, Word) else f"({' '.join(map(_text, form.items))})"
+def _text(form: PddlWord | Form) -> str:
+    return form.text if isinstance(form, PddlWord) else f"({' '.join(map(_text, form.items))})"
 
 
-def _put(form: Form, duration: Word | Form) -> Form:
+def _put(form: Form, duration: PddlWord | Form) -> Form:
     """Return a copy of a form with `duration` substituted for the variable ``?duration``."""
     return replace(
         form,
@@ -142,5 +142,5 @@ def _put(form: Form, duration: Word | Form) -> Form:
     )
 
 
-def _names(item: Word | Form, text: str) -> bool:
-    return item.text == text if isinstance(item, Word) else any(_names(one, text) for one in item.items)
+def _names(item: PddlWord | Form, text: str) -> bool:
+    return item.text == text if isinstance(item, PddlWord) else any(_names(one, text) for one in item.items)

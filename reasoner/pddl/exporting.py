@@ -21,8 +21,8 @@ from confab.reasoner.pddl.formulas import (
     Exists,
     Not,
     Or,
+    PddlTerm,
     Same,
-    Term,
     both,
     calls,
     change_text,
@@ -35,8 +35,8 @@ from confab.reasoner.pddl.formulas import (
     terms_of,
     typed,
 )
-from confab.reasoner.pddl.lowering import Action, Lowering, Scope
-from confab.reasoner.pddl.vocabulary import Vocabulary
+from confab.reasoner.pddl.lowering import ActionScope, LoweredAction, Lowering
+from confab.reasoner.pddl.vocabulary import PddlNames
 from confab.reasoner.symbols import Problem, State
 from confab.reasoner.timing import only_during
 
@@ -121,7 +121,7 @@ class _Export:
     """Intermediate results of the export of one level of a problem."""
 
     def __init__(self, problem: Problem, level: int) -> None:
-        self.problem, self.words = problem, Vocabulary(problem)
+        self.problem, self.words = problem, PddlNames(problem)
         self.lowering = Lowering(problem, problem.domain.at_level(level), self.words)
         cases = [case for behavior in problem.domain.at_level(level) for case in self.lowering.cases(behavior)]
         self.actions = {
@@ -137,7 +137,7 @@ class _Export:
             for symbol, weight in problem.weights.items()
             for soft in [self.lowering.goal(symbol, problem.goal[symbol])]
         ]
-        self.goal = both([*wanted, *self.lowering.within_bounds(Scope({}))])
+        self.goal = both([*wanted, *self.lowering.within_bounds(ActionScope({}))])
         self.facts = [*self.lowering.kept.facts(), *self.words.facts()]
         self.formulas = [*(action.needs for action in self.actions.values()), *(holds for _, _, holds in self.derived)]
         self.changes = [change for action in self.actions.values() for change in action.changes]
@@ -162,7 +162,7 @@ class _Export:
             objects=every,
         )
 
-    def named_in_domain(self) -> Iterator[Term]:
+    def named_in_domain(self) -> Iterator[PddlTerm]:
         """Yield all terms in the exported actions and derived predicates."""
         for formula in self.formulas:
             yield from terms(formula)
@@ -213,7 +213,7 @@ class _Export:
         body = "\n".join([*rules, *(self.action_text(name, action) for name, action in self.actions.items())])
         return f"(define (domain {name})\n  (:requirements {self.requirements()})\n{head}{body})\n"
 
-    def action_text(self, name: str, action: Action) -> str:
+    def action_text(self, name: str, action: LoweredAction) -> str:
         """Return the PDDL text of an action."""
         made = {(change.what, change.when, change.variables) for change in action.changes}
         changes = [

@@ -9,7 +9,7 @@ from math import prod
 from typing import TypeAlias
 
 from confab.reasoner.pddl.declarations import CHANGES, Typed, either
-from confab.reasoner.pddl.words import Form, Word
+from confab.reasoner.pddl.words import Form, PddlWord
 
 Atom = tuple[str, ...]
 """A predicate followed by its terms."""
@@ -18,7 +18,7 @@ MOST_CONJUNCTS = 10_000
 
 
 @dataclass(frozen=True)
-class Effect:
+class PddlEffect:
     """An effect that makes an atom true or false for all values of `variables` that satisfy the conditions `when`."""
 
     atom: Atom
@@ -33,7 +33,7 @@ class NumericEffect:
 
     head: str
     function: Form
-    amount: Word | Form
+    amount: PddlWord | Form
     when: tuple[Form, ...] = ()
     variables: tuple[Typed, ...] = ()
 
@@ -48,14 +48,15 @@ def typed_in(form: Form) -> list[Typed]:
     The syntax of the list must be correct.
     """
     found: list[Typed] = []
-    waiting: list[Word] = []
+    waiting: list[PddlWord] = []
     items = iter(form.items)
     for item in items:
-        assert isinstance(item, Word)
+        assert isinstance(item, PddlWord)
         if item.text == "-":
             kind = next(items)
             found += [
-                Typed(w.text, kind.text if isinstance(kind, Word) else either(words_of(kind)[1:]), w) for w in waiting
+                Typed(w.text, kind.text if isinstance(kind, PddlWord) else either(words_of(kind)[1:]), w)
+                for w in waiting
             ]
             waiting = []
         else:
@@ -65,7 +66,7 @@ def typed_in(form: Form) -> list[Typed]:
 
 def words_of(form: Form) -> Atom:
     """Return the words of a list, without the words of nested lists."""
-    return tuple(item.text for item in form.items if isinstance(item, Word))
+    return tuple(item.text for item in form.items if isinstance(item, PddlWord))
 
 
 def words_in(*forms: Form | None) -> Iterator[Atom]:
@@ -149,15 +150,15 @@ def _known(form: Form, holds: Callable[[Atom], bool | None]) -> bool | None:
     return None if rest or not form.items else holds(words_of(form))
 
 
-def effects_of(form: Form | None) -> Iterator[Effect]:
+def effects_of(form: Form | None) -> Iterator[PddlEffect]:
     """Yield the parts of an effect that make atoms true or false."""
     for change, when, variables in _changes(form):
         if change.head == "not":
             negated = change.items[1]
             assert isinstance(negated, Form)
-            yield Effect(words_of(negated), False, when, variables)
+            yield PddlEffect(words_of(negated), False, when, variables)
         elif change.head not in CHANGES:
-            yield Effect(words_of(change), True, when, variables)
+            yield PddlEffect(words_of(change), True, when, variables)
 
 
 def numeric_of(form: Form | None) -> Iterator[NumericEffect]:

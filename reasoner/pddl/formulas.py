@@ -18,7 +18,7 @@ DIGITS = 30
 
 
 @dataclass(frozen=True)
-class Term:
+class PddlTerm:
     """A variable or an object: its PDDL name, its type, and the individuals that it can denote."""
 
     name: str
@@ -36,19 +36,19 @@ class FunctionTerm:
     """A function with its arguments."""
 
     function: str
-    terms: tuple[Term, ...]
+    terms: tuple[PddlTerm, ...]
 
 
 @dataclass(frozen=True)
-class Operation:
+class Arithmetic:
     """The arithmetic operation `sign` on two numbers."""
 
     sign: str
-    left: Number
-    right: Number
+    left: NumericTerm
+    right: NumericTerm
 
 
-Number: TypeAlias = "Fraction | FunctionTerm | Operation"
+NumericTerm: TypeAlias = "Fraction | FunctionTerm | Arithmetic"
 
 
 @dataclass(frozen=True)
@@ -56,15 +56,15 @@ class Atom:
     """A predicate with its arguments."""
 
     predicate: str
-    terms: tuple[Term, ...]
+    terms: tuple[PddlTerm, ...]
 
 
 @dataclass(frozen=True)
 class Same:
     """An equality of two terms."""
 
-    left: Term
-    right: Term
+    left: PddlTerm
+    right: PddlTerm
 
 
 @dataclass(frozen=True)
@@ -72,8 +72,8 @@ class Compare:
     """A comparison of two numbers by the operator `sign`."""
 
     sign: str
-    left: Number
-    right: Number
+    left: NumericTerm
+    right: NumericTerm
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ class Or:
 class Exists:
     """An existential quantification. A universal quantification is expressed as the negation of an existential quantification."""
 
-    variables: tuple[Term, ...]
+    variables: tuple[PddlTerm, ...]
     inner: Formula
 
 
@@ -116,7 +116,7 @@ class Assignment:
 
     operation: str
     call: FunctionTerm
-    by: Number
+    by: NumericTerm
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ class ConditionalEffect:
 
     what: Atom | Not | Assignment
     when: Formula = TRUE
-    variables: tuple[Term, ...] = ()
+    variables: tuple[PddlTerm, ...] = ()
 
 
 # ------------------------------------------------------------------------------------------------------------ building
@@ -156,7 +156,7 @@ def no(formula: Formula, yes: bool = True) -> Formula:
     return formula.inner if isinstance(formula, Not) else Not(formula)
 
 
-def some(variables: Iterable[Term], formula: Formula) -> Formula:
+def some(variables: Iterable[PddlTerm], formula: Formula) -> Formula:
     """Return a formula with an existential quantifier for the variables that the formula mentions."""
     variables = tuple(variables)
     if formula == FALSE or not all(one.members for one in variables):
@@ -166,7 +166,7 @@ def some(variables: Iterable[Term], formula: Formula) -> Formula:
     return Exists(used, formula) if used else formula
 
 
-def same(left: Term, right: Term) -> Formula:
+def same(left: PddlTerm, right: PddlTerm) -> Formula:
     """Return the equality of two terms.
 
     The equality is true for equal terms, and false for terms that can't denote the same individual.
@@ -197,19 +197,19 @@ def inside(formula: Formula) -> Iterator[Formula]:
             return
 
 
-def calls(number: Number) -> Iterator[FunctionTerm]:
+def calls(number: NumericTerm) -> Iterator[FunctionTerm]:
     """Yield the function terms in a numeric expression."""
     match number:
         case FunctionTerm():
             yield number
-        case Operation(_, left, right):
+        case Arithmetic(_, left, right):
             yield from calls(left)
             yield from calls(right)
         case Fraction():
             return
 
 
-def terms(formula: Formula) -> Iterator[Term]:
+def terms(formula: Formula) -> Iterator[PddlTerm]:
     """Yield the terms of all atoms, equalities and comparisons in a formula."""
     for one in inside(formula):
         match one:
@@ -223,7 +223,7 @@ def terms(formula: Formula) -> Iterator[Term]:
                 continue
 
 
-def terms_of(change: ConditionalEffect) -> Iterator[Term]:
+def terms_of(change: ConditionalEffect) -> Iterator[PddlTerm]:
     """Yield the terms in an effect and its condition."""
     yield from terms(change.when)
     if isinstance(change.what, Assignment):
@@ -236,7 +236,7 @@ def terms_of(change: ConditionalEffect) -> Iterator[Term]:
 # ------------------------------------------------------------------------------------------------------------- writing
 
 
-def typed(variables: Sequence[Term]) -> str:
+def typed(variables: Sequence[PddlTerm]) -> str:
     """Return variables with their types in the notation of PDDL declarations."""
     return " ".join(f"{one.name} - {one.type}" for one in variables)
 
@@ -270,12 +270,12 @@ def change_text(change: ConditionalEffect) -> str:
     return f"(forall ({typed(change.variables)}) {text})" if change.variables else text
 
 
-def number_text(number: Number) -> str:
+def number_text(number: NumericTerm) -> str:
     """Return the PDDL text of a numeric expression; a number without a finite decimal notation becomes a quotient."""
     match number:
         case FunctionTerm(function, its):
             return f"({' '.join([function, *(term.name for term in its)])})"
-        case Operation(sign, left, right):
+        case Arithmetic(sign, left, right):
             return f"({sign} {number_text(left)} {number_text(right)})"
         case Fraction():
             text = written(number)

@@ -37,8 +37,8 @@ from confab.reasoner.derivation import circles
 from confab.reasoner.pddl.declarations import COMPARISONS, Pddl, Typed
 from confab.reasoner.pddl.forms import (
     Atom,
-    Effect,
     NumericEffect,
+    PddlEffect,
     atoms_in,
     conjuncts,
     effects_of,
@@ -49,9 +49,9 @@ from confab.reasoner.pddl.forms import (
     words_in,
     words_of,
 )
-from confab.reasoner.pddl.invariants import Invariants, Part
-from confab.reasoner.pddl.timing import Variables, happenings, snapped, timing
-from confab.reasoner.pddl.words import Form, PddlError, Word, is_number
+from confab.reasoner.pddl.invariants import InvariantPart, Invariants
+from confab.reasoner.pddl.timing import QuantifiedVariables, happenings, snapped, timing
+from confab.reasoner.pddl.words import Form, PddlError, PddlWord, is_number
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -84,14 +84,14 @@ BASE = "https://w3id.org/confab/pddl/"
 
 
 @dataclass(frozen=True)
-class Place:
+class PredicateTranslation:
     """The translation of a predicate: its situation type, the positions of the object and the value, and possibly a fixed value.
 
     A predicate has a fixed value if none of its arguments is the value.
     """
 
     situation: str
-    part: Part | None = None
+    part: InvariantPart | None = None
     value: str = TRUE
 
 
@@ -132,7 +132,7 @@ class _Import:
     level: int
     names: dict[tuple[str, str], str] = field(default_factory=dict)  # the problem's name, by kind and PDDL name
     taken: set[str] = field(default_factory=lambda: {TRUE, FALSE, "Truth", "Object", "Hand", "Robot", WORLD, THE_WORLD})
-    places: dict[str, Place] = field(default_factory=dict)
+    places: dict[str, PredicateTranslation] = field(default_factory=dict)
     variables: dict[str, str] = field(default_factory=dict)  # the PDDL name, by the problem's name
 
     def __post_init__(self) -> None:
@@ -278,11 +278,11 @@ class _Import:
                 if part.counted is None:
                     value = self.name("value", part.predicate, f"{part.predicate}_")
                     own.append(value)
-                    self.places[part.predicate] = Place(name, part, value)
+                    self.places[part.predicate] = PredicateTranslation(name, part, value)
                 else:
                     kind = self.kind(self.signatures[part.predicate][part.counted])
                     parents[kind] = (*parents.get(kind, ()), name)
-                    self.places[part.predicate] = Place(name, part)
+                    self.places[part.predicate] = PredicateTranslation(name, part)
             none = self.name("value", name, f"no_{parts[0].predicate}")
             own.append(none)
             classes[name] = tuple(own)
@@ -301,7 +301,7 @@ class _Import:
             name = self.name("situation", predicate, predicate.upper())
             arguments = tuple(map(self.kind, signature)) or (WORLD,)
             found[name] = SituationType(name, arguments, "Truth", default=FALSE, boolean=True)
-            self.places[predicate] = Place(name)
+            self.places[predicate] = PredicateTranslation(name)
         for function in sorted(self.amounts):
             arguments = tuple(self.kind(one.type) for one in self.pddl.functions[function]) or (WORLD,)
             name = self.name("situation", f"({function})", function.upper())
@@ -390,7 +390,7 @@ class _Import:
         """
         if part.head in COMPARISONS and part.items[1:] and isinstance(part.items[1], Form):
             function, limit = part.items[1:]
-            if not isinstance(function, Form) or function.head not in self.amounts or not isinstance(limit, Word):
+            if not isinstance(function, Form) or function.head not in self.amounts or not isinstance(limit, PddlWord):
                 return False
             terms = tuple(self.term(w) for w in words_of(function)[1:]) or (THE_WORLD,)
             symbol = Symbol(self.name("situation", f"({function.head})"), terms)
@@ -516,7 +516,7 @@ class _Import:
         waiting: list[tuple[Form, Fraction]] = [(self.pddl.minimize, Fraction(1))] if self.pddl.minimize else []
         while waiting:
             form, factor = waiting.pop()
-            numbers = [Fraction(item.text) for item in form.items[1:] if isinstance(item, Word) and is_number(item)]
+            numbers = [Fraction(item.text) for item in form.items[1:] if isinstance(item, PddlWord) and is_number(item)]
             forms = [item for item in form.items[1:] if isinstance(item, Form)]
             if form.head == "+":
                 waiting += [(one, factor) for one in forms]
@@ -528,9 +528,9 @@ class _Import:
                 found[f"is-violated {words_of(form)[1]}"] = factor
         return found
 
-    def number(self, item: Word | Form, named: Mapping[str, str]) -> Expression:
+    def number(self, item: PddlWord | Form, named: Mapping[str, str]) -> Expression:
         """Return the translation of a number, a function or an arithmetic expression."""
-        if isinstance(item, Word):
+        if isinstance(item, PddlWord):
             return Fraction(item.text)
         if item.head in ("+", "-", "*", "/"):
             parts = [self.number(one, named) for one in item.items[1:]]
@@ -543,7 +543,11 @@ class _Import:
         return Measure(self.name("static", f"({item.head})"), terms)
 
     def amount_effects(
-        self, name: str, effects: Sequence[NumericEffect], variables: Variables, conditions: Sequence[Condition]
+        self,
+        name: str,
+        effects: Sequence[NumericEffect],
+        variables: QuantifiedVariables,
+        conditions: Sequence[Condition],
     ) -> tuple[AmountEffect, ...]:
         """Return the effects of an action on amounts, one for each binding of quantified variables."""
         found = []
@@ -575,7 +579,7 @@ class _Import:
         return sum(words[0] == function for words in self.pddl.numbers) == things
 
     def value_effects(
-        self, effects: Sequence[Effect], variables: Variables, conditions: Sequence[Condition]
+        self, effects: Sequence[PddlEffect], variables: QuantifiedVariables, conditions: Sequence[Condition]
     ) -> tuple[ValueEffect, ...]:
         """Return the effects of an action on values.
 
@@ -603,13 +607,13 @@ class _Import:
                 ends.append(ValueEffect(at.situation, at.arguments, none, when if known else (*when, at)))
         return tuple(dict.fromkeys((*ends, *begins)))
 
-    def instances(self, effect: Effect | NumericEffect) -> Iterator[dict[str, str]]:
+    def instances(self, effect: PddlEffect | NumericEffect) -> Iterator[dict[str, str]]:
         """Yield all bindings of an effect's quantified variables to objects."""
         names = [self.term(v.name) for v in effect.variables]
         things = [[self.name("object", o) for o in self.pddl.of_type(v.type)] for v in effect.variables]
         yield from (dict(zip(names, row, strict=True)) for row in product(*things))
 
-    def replaced(self, end: Effect, effects: Sequence[Effect]) -> bool:
+    def replaced(self, end: PddlEffect, effects: Sequence[PddlEffect]) -> bool:
         """Return whether an effect that takes a value from a symbol is redundant, because another effect gives a new value."""
         symbol = replace(self.atom(end.atom), value="")
         return any(

@@ -16,7 +16,7 @@ from functools import cached_property
 from itertools import combinations
 
 from confab.reasoner.pddl.declarations import Action, Pddl
-from confab.reasoner.pddl.forms import Atom, Effect, atoms_in, conjuncts, words_of
+from confab.reasoner.pddl.forms import Atom, PddlEffect, atoms_in, conjuncts, words_of
 from confab.reasoner.pddl.words import Form
 
 COUNTED: Mapping[int, tuple[tuple[int, int | None], ...]] = {1: ((0, None),), 2: ((0, 1), (1, 0))}
@@ -24,7 +24,7 @@ COUNTED: Mapping[int, tuple[tuple[int, int | None], ...]] = {1: ((0, None),), 2:
 
 
 @dataclass(frozen=True)
-class Part:
+class InvariantPart:
     """A predicate of an invariant, with the positions of the object (`key`) and of the value (`counted`) among its arguments.
 
     For a predicate of one argument, `counted` is None, and the predicate itself is the value.
@@ -51,20 +51,20 @@ class Invariants:
     """
 
     pddl: Pddl
-    effects: Mapping[str, Sequence[Effect]]
+    effects: Mapping[str, Sequence[PddlEffect]]
     changing: frozenset[str]
     fluent: frozenset[str]
     sets: Mapping[str, frozenset[str]]
 
-    def found(self) -> list[tuple[Part, ...]]:
+    def found(self) -> list[tuple[InvariantPart, ...]]:
         """Return the proved invariants; no predicate is in two of them. Each invariant is a tuple of its parts."""
-        candidates: list[tuple[Part, ...]] = [
-            (Part(predicate, key, counted),)
+        candidates: list[tuple[InvariantPart, ...]] = [
+            (InvariantPart(predicate, key, counted),)
             for predicate, signature in self.pddl.predicates.items()
             if predicate in self.changing
             for key, counted in COUNTED.get(len(signature), ())
         ]
-        proved: list[tuple[Part, ...]] = []
+        proved: list[tuple[InvariantPart, ...]] = []
         seen = set(candidates)
         while candidates:
             parts = candidates.pop(0)
@@ -88,13 +88,13 @@ class Invariants:
                 found.append(tuple(sorted(parts, key=lambda p: (p.counted is None, order[p.predicate]))))
         return found
 
-    def at_most_one(self, parts: Sequence[Part]) -> bool:
+    def at_most_one(self, parts: Sequence[InvariantPart]) -> bool:
         """Return whether at most one fact of the invariant holds for each object in the initial state."""
         of = {part.predicate: part for part in parts}
         count = Counter(fact[1 + of[fact[0]].key] for fact in dict.fromkeys(self.pddl.initial) if fact[0] in of)
         return all(number == 1 for number in count.values())
 
-    def distinguishable(self, parts: Sequence[Part]) -> bool:
+    def distinguishable(self, parts: Sequence[InvariantPart]) -> bool:
         """Return whether at most one predicate of the invariant can relate a given object and a given value."""
         counted = [p for p in parts if p.counted is not None]
         of = {p.predicate: p for p in counted}
@@ -150,7 +150,7 @@ class Invariants:
                 domain &= {fact[1] for fact in self.pddl.initial if fact[0] == atom[0]}
         return domain
 
-    def unbalanced(self, parts: Sequence[Part]) -> list[Part] | None:
+    def unbalanced(self, parts: Sequence[InvariantPart]) -> list[InvariantPart] | None:
         """Return None if every action preserves the invariant; otherwise return parts whose addition might repair the invariant."""
         of = {part.predicate: part for part in parts}
         for name, action in self.pddl.actions.items():
@@ -186,7 +186,7 @@ class Invariants:
                     spent.add(match)
                     continue
                 return [
-                    Part(atom[0], position, counted)
+                    InvariantPart(atom[0], position, counted)
                     for atom in deleted
                     if atom[0] not in of and len(atom) <= 3
                     for position, term in enumerate(atom[1:])

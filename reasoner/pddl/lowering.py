@@ -27,10 +27,11 @@ from confab.reasoner.amounts import inside as parts
 from confab.reasoner.derivation import circular
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.language import is_variable, terms
-from confab.reasoner.pddl.absence import Kept
+from confab.reasoner.pddl.absence import NegationPredicates
 from confab.reasoner.pddl.formulas import FALSE as NEVER
 from confab.reasoner.pddl.formulas import TRUE as ALWAYS
 from confab.reasoner.pddl.formulas import (
+    Arithmetic,
     Assignment,
     Atom,
     Compare,
@@ -38,16 +39,15 @@ from confab.reasoner.pddl.formulas import (
     Formula,
     FunctionTerm,
     Not,
-    Number,
-    Operation,
-    Term,
+    NumericTerm,
+    PddlTerm,
     both,
     either,
     no,
     same,
     some,
 )
-from confab.reasoner.pddl.vocabulary import Vocabulary
+from confab.reasoner.pddl.vocabulary import PddlNames
 from confab.reasoner.symbols import (
     FALSE,
     AmountEffect,
@@ -65,31 +65,31 @@ from confab.reasoner.symbols import (
     Witness,
 )
 
-Terms = Mapping[str, Term]
+Terms = Mapping[str, PddlTerm]
 CASES = 4
 """A conditional effect on a symbol is split into one action per value only if the symbol has at most this many other values."""
 
 
 @dataclass(frozen=True)
-class Action:
+class LoweredAction:
     """A PDDL action with the precondition `needs`; `places` are the positions of the behaviour's parameters in `parameters`."""
 
     behavior: Behavior
-    parameters: tuple[Term, ...]
+    parameters: tuple[PddlTerm, ...]
     places: tuple[int, ...]
     needs: Formula
     changes: tuple[ConditionalEffect, ...]
-    cost: Number
+    cost: NumericTerm
 
 
 @dataclass
-class Scope:
+class ActionScope:
     """The variables of a behaviour or rule during its translation, the known values of symbols, and the preconditions."""
 
     kinds: Mapping[str, str]
     names: set[str] = field(default_factory=set)
-    parameters: list[Term] = field(default_factory=list)
-    values: dict[tuple[str, tuple[Term, ...]], Term] = field(default_factory=dict)
+    parameters: list[PddlTerm] = field(default_factory=list)
+    values: dict[tuple[str, tuple[PddlTerm, ...]], PddlTerm] = field(default_factory=dict)
     needs: list[Formula] = field(default_factory=list)
 
     def fresh(self, wanted: str) -> str:
@@ -103,42 +103,42 @@ class Scope:
 
 
 @dataclass(frozen=True)
-class Cell:
+class LoweredEffect:
     """An effect on one symbol: the symbol's arguments, the new value, the effect's condition, and the condition's own variables."""
 
-    own: tuple[Term, ...]
+    own: tuple[PddlTerm, ...]
     when: Formula
-    terms: tuple[Term, ...]
-    value: Term | None
+    terms: tuple[PddlTerm, ...]
+    value: PddlTerm | None
 
 
 class Lowering:
     """Translation of the conditions and behaviours of one level to formulas and actions."""
 
-    def __init__(self, problem: Problem, behaviors: Sequence[Behavior], words: Vocabulary) -> None:
+    def __init__(self, problem: Problem, behaviors: Sequence[Behavior], words: PddlNames) -> None:
         self.problem, self.behaviors, self.words = problem, behaviors, words
         self.rules = problem.domain.rules
         self.recursive = circular(self.rules)
-        self.kept = Kept(problem, behaviors, words)
+        self.kept = NegationPredicates(problem, behaviors, words)
         changed = {effect.situation for behavior in behaviors for effect in behavior.amounts}
         self.totals = sorted(changed & problem.domain.aggregates.keys())
 
     # ------------------------------------------------------------------------------------------------- conditions
 
-    def all_of(self, conditions: Sequence[Condition], terms: Terms, scope: Scope) -> Formula:
+    def all_of(self, conditions: Sequence[Condition], terms: Terms, scope: ActionScope) -> Formula:
         """Return the formula of a conjunction of conditions, in which unbound variables are existentially quantified."""
         own, inside = self.bound(conditions, terms, scope)
         parts = [self.words.guard(inside[name], scope.kinds[name]) for name in own]
         parts += [self.formula(condition, inside, scope) for condition in conditions]
         return some((inside[name] for name in own), both(parts))
 
-    def bound(self, conditions: Sequence[Condition], terms: Terms, scope: Scope) -> tuple[list[str], Terms]:
+    def bound(self, conditions: Sequence[Condition], terms: Terms, scope: ActionScope) -> tuple[list[str], Terms]:
         """Return the unbound variables of a conjunction, and the mapping of names to terms extended by these variables."""
         own = sorted(set[str]().union(*map(named, conditions)) - terms.keys())
         fresh = {name: self.words.variable(scope.fresh(name), scope.kinds[name]) for name in own}
         return own, {**terms, **fresh}
 
-    def formula(self, condition: Condition, terms: Terms, scope: Scope) -> Formula:
+    def formula(self, condition: Condition, terms: Terms, scope: ActionScope) -> Formula:
         """Return the PDDL formula of a condition."""
         words = self.words
         match condition:
@@ -167,23 +167,23 @@ class Lowering:
                 compared = Compare(sign, words.number(left, terms), words.number(right, terms))
                 return no(both([there, compared]), negated)
 
-    def defined(self, situation: str, its: tuple[Term, ...], scope: Scope) -> Formula:
+    def defined(self, situation: str, its: tuple[PddlTerm, ...], scope: ActionScope) -> Formula:
         """Return the formula that a boolean symbol is true: the conditions of its rules or, if the rules are recursive, an atom."""
         if situation not in self.rules or situation in self.recursive:
             return self.words.value(situation, its, None)
         ways = []
         for rule in self.rules[situation]:
-            inner = Scope(rule.behavior.kinds, scope.names)
+            inner = ActionScope(rule.behavior.kinds, scope.names)
             given = {p.name: term for p, term in zip(rule.parameters, its, strict=True)}
             fits = [self.words.is_a(given[p.name], p.kind) for p in rule.parameters]
             ways.append(both([*fits, self.all_of(rule.conditions, given, inner)]))
         return either(ways)
 
-    def derived(self) -> Iterator[tuple[Atom, tuple[Term, ...], Formula]]:
+    def derived(self) -> Iterator[tuple[Atom, tuple[PddlTerm, ...], Formula]]:
         """Yield the atom, the variables and the condition of each recursive rule."""
         for situation in sorted(self.recursive):
             for rule in self.rules[situation]:
-                scope = Scope(rule.behavior.kinds)
+                scope = ActionScope(rule.behavior.kinds)
                 terms = {p.name: self.words.variable(scope.fresh(p.name), p.kind) for p in rule.parameters}
                 head = self.words.value(situation, tuple(terms.values()), None)
                 guards = [self.words.guard(terms[p.name], p.kind) for p in rule.parameters]
@@ -229,12 +229,12 @@ class Lowering:
 
     def total(self, behavior: Behavior, situation: str, arguments: Sequence[str]) -> bool:
         """Return whether the symbols of a situation type exist for all individuals that the arguments can denote."""
-        terms = [Term(argument, "object", self.kept.members(behavior, argument)) for argument in arguments]
+        terms = [PddlTerm(argument, "object", self.kept.members(behavior, argument)) for argument in arguments]
         return self.words.total(situation, terms)
 
-    def action(self, behavior: Behavior) -> Action | None:
+    def action(self, behavior: Behavior) -> LoweredAction | None:
         """Return the PDDL action of a behaviour; return None if the behaviour is never applicable or has no effect."""
-        scope, terms = Scope(behavior.kinds), dict[str, Term]()
+        scope, terms = ActionScope(behavior.kinds), dict[str, PddlTerm]()
         used = set[str]().union(*map(named, behavior.preconditions), terms_of(behavior.price or Fraction(0)))
         for one in (*behavior.parameters, *(v for v in behavior.variables if v.name in used)):
             terms[one.name] = self.words.variable(scope.fresh(one.name), one.kind)
@@ -259,15 +259,15 @@ class Lowering:
             return None
         names = [term.name for term in scope.parameters]
         places = tuple(names.index(terms[p.name].name) for p in behavior.parameters)
-        return Action(behavior, tuple(scope.parameters), places, needs, tuple(changes), cost)
+        return LoweredAction(behavior, tuple(scope.parameters), places, needs, tuple(changes), cost)
 
-    def parameter(self, wanted: str, members: Iterable[str], scope: Scope) -> Term:
+    def parameter(self, wanted: str, members: Iterable[str], scope: ActionScope) -> PddlTerm:
         """Add to an action a parameter for a value that the preconditions determine, and return the parameter."""
-        term = Term(scope.fresh(wanted), "object", frozenset(members))
+        term = PddlTerm(scope.fresh(wanted), "object", frozenset(members))
         scope.parameters.append(term)
         return term
 
-    def known(self, situation: str, its: tuple[Term, ...], wanted: str, scope: Scope) -> Term:
+    def known(self, situation: str, its: tuple[PddlTerm, ...], wanted: str, scope: ActionScope) -> PddlTerm:
         """Return the value of a symbol; if no condition states the value, add a parameter and return the parameter."""
         if (situation, its) not in scope.values:
             value = self.parameter(wanted, self.range_of(situation), scope)
@@ -290,7 +290,7 @@ class Lowering:
             if self.words.exists(situation, (one,)) == ALWAYS:
                 yield self.kept.lacks(situation, (one,), its)
 
-    def need(self, condition: Condition, terms: Terms, scope: Scope) -> None:
+    def need(self, condition: Condition, terms: Terms, scope: ActionScope) -> None:
         """Add the translation of a precondition to `scope`."""
         words = self.words
         match condition:
@@ -313,7 +313,7 @@ class Lowering:
                 pass
         scope.needs.append(self.formula(condition, terms, scope))
 
-    def cost(self, behavior: Behavior, terms: Terms, scope: Scope) -> Number:
+    def cost(self, behavior: Behavior, terms: Terms, scope: ActionScope) -> NumericTerm:
         """Return the cost of an action, and add the precondition that the cost is a number of at least 0.
 
         A static predicate expresses that the numbers exist, since not every planner with action costs supports numeric
@@ -342,7 +342,7 @@ class Lowering:
 
     # ---------------------------------------------------------------------------------------------------- effects
 
-    def cell(self, effect: ValueEffect | AmountEffect, terms: Terms, scope: Scope) -> tuple[Cell, Terms]:
+    def cell(self, effect: ValueEffect | AmountEffect, terms: Terms, scope: ActionScope) -> tuple[LoweredEffect, Terms]:
         """Return the symbol that an effect changes, and a mapping of the effect's variables to PDDL terms."""
         own, inside = self.bound(effect.when, terms, scope)
         its = self.words.terms(effect.arguments, inside)
@@ -350,9 +350,9 @@ class Lowering:
         when += [self.formula(condition, inside, scope) for condition in effect.when]
         when.append(self.words.exists(effect.situation, its))
         value = self.words.terms((effect.value,), inside)[0] if isinstance(effect, ValueEffect) else None
-        return Cell(tuple(inside[name] for name in own), both(when), its, value), inside
+        return LoweredEffect(tuple(inside[name] for name in own), both(when), its, value), inside
 
-    def value_changes(self, behavior: Behavior, terms: Terms, scope: Scope) -> Iterator[ConditionalEffect]:
+    def value_changes(self, behavior: Behavior, terms: Terms, scope: ActionScope) -> Iterator[ConditionalEffect]:
         """Yield the PDDL effects of a behaviour on values; if two effects change one symbol, the later one takes precedence."""
         cells = [(effect, *self.cell(effect, terms, scope)) for effect in behavior.effects]
         for number, (effect, cell, inside) in enumerate(cells):
@@ -368,9 +368,11 @@ class Lowering:
             ]
             when = both([cell.when, no(either(later))])
             if when != NEVER:
-                yield from self.moved(effect, Cell(cell.own, when, cell.terms, cell.value), inside, scope)
+                yield from self.moved(effect, LoweredEffect(cell.own, when, cell.terms, cell.value), inside, scope)
 
-    def moved(self, effect: ValueEffect, cell: Cell, inside: Terms, scope: Scope) -> Iterator[ConditionalEffect]:
+    def moved(
+        self, effect: ValueEffect, cell: LoweredEffect, inside: Terms, scope: ActionScope
+    ) -> Iterator[ConditionalEffect]:
         """Yield the PDDL effects that replace the old value of a symbol by a new value, and that update the extra predicates."""
         words, situation, its, new = self.words, effect.situation, cell.terms, cell.value
         assert new is not None
@@ -386,7 +388,7 @@ class Lowering:
         elif (situation, its) in scope.values or (when == ALWAYS and not own and words.total(situation, its)):
             old = self.known(situation, its, "old", scope)
         else:
-            old = Term(scope.fresh("old"), "object", self.range_of(situation))
+            old = PddlTerm(scope.fresh("old"), "object", self.range_of(situation))
         if old == new:
             return
         yield ConditionalEffect(words.value(situation, its, new), when, own)
@@ -417,13 +419,13 @@ class Lowering:
             if new.members & asked_of:
                 yield ConditionalEffect(Not(self.kept.none_has(kind, situation, new)), both([when, member]), own)
 
-    def amount_changes(self, behavior: Behavior, terms: Terms, scope: Scope) -> Iterator[ConditionalEffect]:
+    def amount_changes(self, behavior: Behavior, terms: Terms, scope: ActionScope) -> Iterator[ConditionalEffect]:
         """Yield the PDDL effects of a behaviour on amounts, and add preconditions that their results are numbers within bounds.
 
         If an amount is multiplied or assigned and then increased, both effects become one assignment, because planners don't
         apply several such effects in sequence.
         """
-        groups: dict[tuple[str, FunctionTerm, Formula, tuple[Term, ...]], list[tuple[str, Number, bool]]] = {}
+        groups: dict[tuple[str, FunctionTerm, Formula, tuple[PddlTerm, ...]], list[tuple[str, NumericTerm, bool]]] = {}
         for effect in behavior.amounts:
             cell, inside = self.cell(effect, terms, scope)
             if cell.when != NEVER:
@@ -435,10 +437,10 @@ class Lowering:
                 by = self.words.number(effect.amount, inside)
                 group.append((effect.operation, by, effect.operation != "scale" or not situations_in(effect.amount)))
         for (situation, at, when, own), changes in groups.items():
-            result: Number = at
+            result: NumericTerm = at
             for operation, by, _ in changes:
                 sign = {"scale": "*", "increase": "+", "decrease": "-"}.get(operation)
-                result = by if sign is None else Operation(sign, result, by)
+                result = by if sign is None else Arithmetic(sign, result, by)
             # Several effects change a total at once: `within_bounds` states its bounds.
             quantity = None if situation in self.totals else self.words.situations[situation].quantity
             for sign, limit in (("<", quantity.least), (">", quantity.most)) if quantity else ():
@@ -452,7 +454,7 @@ class Lowering:
             else:
                 yield ConditionalEffect(Assignment("assign", at, result), when, own)
 
-    def within_bounds(self, scope: Scope) -> Iterator[Formula]:
+    def within_bounds(self, scope: ActionScope) -> Iterator[Formula]:
         """Yield the formulas which state that all totals are within their bounds.
 
         The bounds of totals are preconditions of every action, and a part of the goal. A state in which a total is out of its
@@ -497,7 +499,7 @@ class Lowering:
         words = self.words
         situation, its = words.situations[symbol.situation], words.terms(symbol.arguments, {})
         if situation.quantity is None:
-            return self.formula(ValueCondition(symbol.situation, symbol.arguments, wanted), {}, Scope({}))
+            return self.formula(ValueCondition(symbol.situation, symbol.arguments, wanted), {}, ActionScope({}))
         at = words.amount(symbol.situation, its)
         exists = words.exists(symbol.situation, its)
         return both([exists, *(Compare(sign, at, limit) for sign, limit in bounds(wanted))])
@@ -508,8 +510,8 @@ def named(condition: Condition) -> set[str]:
     return set(filter(is_variable, terms(condition)))
 
 
-def _times(number: Number, times: int) -> Number:
+def _times(number: NumericTerm, times: int) -> NumericTerm:
     """Return a numeric expression multiplied by a whole number."""
     if isinstance(number, Fraction):
         return number * times
-    return number if times == 1 else Operation("*", number, Fraction(times))
+    return number if times == 1 else Arithmetic("*", number, Fraction(times))

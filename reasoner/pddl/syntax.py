@@ -21,7 +21,7 @@ from pathlib import Path
 
 from confab.reasoner.pddl.declarations import CHANGES, COMPARISONS, Action, Axiom, Pddl, Typed, either
 from confab.reasoner.pddl.durative import Durative, NotTimedError, duration_in, timed, whole
-from confab.reasoner.pddl.words import MOST_BYTES, Form, PddlError, Word, form_of, is_number
+from confab.reasoner.pddl.words import MOST_BYTES, Form, PddlError, PddlWord, form_of, is_number
 
 SECTIONS = {
     ":process": "processes",
@@ -76,11 +76,11 @@ class _Reader:
     pddl: Pddl
     derived: set[str] = field(default_factory=set)  # names of derived predicates
 
-    def fail(self, at: Word | Form, message: str) -> PddlError:
+    def fail(self, at: PddlWord | Form, message: str) -> PddlError:
         return PddlError(f"{self.file}:{at.line}:{at.column}: {message}")
 
-    def word(self, item: Word | Form, what: str) -> Word:
-        if not isinstance(item, Word):
+    def word(self, item: PddlWord | Form, what: str) -> PddlWord:
+        if not isinstance(item, PddlWord):
             raise self.fail(item, f"wanted {what}, got a list")
         return item
 
@@ -167,7 +167,7 @@ class _Reader:
     def goal(self, form: Form) -> None:
         """Read the goal; a conjunct ``(preference NAME CONDITION)`` is a soft goal."""
         parts = [*form.items[1:]] if form.head == "and" else [form]
-        hard: list[Word | Form] = []
+        hard: list[PddlWord | Form] = []
         for part in parts:
             if not isinstance(part, Form) or part.head != "preference":
                 hard.append(part)
@@ -180,7 +180,7 @@ class _Reader:
             self.condition(part.items[2], {})
             self.pddl.preferences[name] = part.items[2]
         if self.pddl.preferences:
-            form = Form((Word("and", form.line, form.column), *hard), form.line, form.column)
+            form = Form((PddlWord("and", form.line, form.column), *hard), form.line, form.column)
         if form.items:
             self.condition(form, {})
             self.pddl.goal = form
@@ -188,7 +188,7 @@ class _Reader:
     def metric(self, form: Form) -> None:
         words = form.items[1:]
         wanted = words[1] if len(words) == 2 and self.word(words[0], "minimize").text == "minimize" else None
-        if isinstance(wanted, Word):  # (:metric minimize total-cost), a function without brackets
+        if isinstance(wanted, PddlWord):  # (:metric minimize total-cost), a function without brackets
             wanted = Form((wanted,), wanted.line, wanted.column)
         if wanted is None:
             raise self.fail(form, "the only metric supported is (:metric minimize …)")
@@ -197,10 +197,10 @@ class _Reader:
                 self.number(wanted, {})
             self.pddl.minimize = wanted
 
-    def typed(self, items: Sequence[Word | Form], declaring: bool = False) -> list[Typed]:
+    def typed(self, items: Sequence[PddlWord | Form], declaring: bool = False) -> list[Typed]:
         """Return the names with their types in a list such as ``a b - t c``; a name without a type is an ``object``."""
         found: list[Typed] = []
-        waiting: list[Word] = []
+        waiting: list[PddlWord] = []
         position = 0
         while position < len(items):
             word = self.word(items[position], "a name")
@@ -215,7 +215,7 @@ class _Reader:
             position += 1
         return [*found, *(Typed(name.text, "object", name) for name in waiting)]
 
-    def kind(self, item: Word | Form, declaring: bool) -> str:
+    def kind(self, item: PddlWord | Form, declaring: bool) -> str:
         """Return the name of a type. For ``(either a b)``, declare a common supertype of `a` and `b`, and return its name."""
         if isinstance(item, Form):
             words = [self.word(one, "a type") for one in item.items[1:]]
@@ -233,7 +233,7 @@ class _Reader:
             raise self.fail(item, f"undefined type '{item.text}' (known: {known})")
         return item.text
 
-    def types(self, items: Sequence[Word | Form]) -> None:
+    def types(self, items: Sequence[PddlWord | Form]) -> None:
         """Parse type declarations. A type that is declared twice, or with ``either``, has several supertypes."""
         declared = self.typed(items, declaring=True)
         for one in declared:
@@ -246,7 +246,7 @@ class _Reader:
             if any(one.name in self.pddl.above(kind) for kind in self.pddl.types[one.name]) and one.name != "object":
                 raise self.fail(one.place, f"type '{one.name}' is above itself")
 
-    def objects(self, items: Sequence[Word | Form]) -> None:
+    def objects(self, items: Sequence[PddlWord | Form]) -> None:
         """Parse object declarations. If an object is declared with a type and with its subtype, the object has the subtype."""
         for one in self.typed(items):
             known = self.pddl.objects.get(one.name, one.type)
@@ -254,19 +254,19 @@ class _Reader:
                 raise self.fail(one.place, f"'{one.name}' is declared as {known} and as {one.type}")
             self.pddl.objects[one.name] = known if one.type in self.pddl.above(known) else one.type
 
-    def signatures(self, items: Sequence[Word | Form], what: str) -> Iterator[tuple[str, tuple[Typed, ...]]]:
+    def signatures(self, items: Sequence[PddlWord | Form], what: str) -> Iterator[tuple[str, tuple[Typed, ...]]]:
         for item in items:
             if not isinstance(item, Form) or not item.head:
                 raise self.fail(item, f"wanted a {what} such as (at ?x)")
             yield item.head, tuple(self.typed(item.items[1:]))
 
-    def functions(self, items: Sequence[Word | Form]) -> None:
+    def functions(self, items: Sequence[PddlWord | Form]) -> None:
         position = 0
         while position < len(items):
             item = items[position]
-            if isinstance(item, Word) and item.text == "-":
+            if isinstance(item, PddlWord) and item.text == "-":
                 kind = items[position + 1] if position + 1 < len(items) else item
-                if not isinstance(kind, Word) or kind.text != "number":
+                if not isinstance(kind, PddlWord) or kind.text != "number":
                     raise self.fail(kind, "object fluents are not supported; a function is a number")
                 position += 2
                 continue
@@ -308,7 +308,7 @@ class _Reader:
     def durative(
         self,
         form: Form,
-        name: Word,
+        name: PddlWord,
         parameters: tuple[Typed, ...],
         variables: Mapping[str, str],
         parts: Mapping[str, Form],
@@ -351,7 +351,7 @@ class _Reader:
             self.condition(form.items[2], self.scope(parameters, {}))
         self.pddl.axioms.append(Axiom(head.head, parameters, form.items[2]))
 
-    def constraints(self, parts: Sequence[Word | Form], each: Sequence[Form] = ()) -> None:
+    def constraints(self, parts: Sequence[PddlWord | Form], each: Sequence[Form] = ()) -> None:
         """Parse constraints on all states of a plan, also inside ``and`` and ``forall``.
 
         A constraint becomes a derived predicate that is true if the constraint is violated, and that must never be true. For
@@ -422,7 +422,7 @@ class _Reader:
         while f"{name}-{number}" in self.pddl.predicates:
             number += 1
         self.pddl.predicates[f"{name}-{number}"] = typed
-        return Form((Word(f"{name}-{number}", 0, 0), *(Word(one.name, 0, 0) for one in typed)), 0, 0)
+        return Form((PddlWord(f"{name}-{number}", 0, 0), *(PddlWord(one.name, 0, 0) for one in typed)), 0, 0)
 
     def stated(self, form: Form, where: str) -> None:
         """Raise an error if the predicate of an effect or an initial fact is a derived predicate."""
@@ -443,7 +443,7 @@ class _Reader:
 
     # ---------------------------------------------------------------------------------------------- formulas
 
-    def condition(self, form: Word | Form, variables: Mapping[str, str]) -> None:
+    def condition(self, form: PddlWord | Form, variables: Mapping[str, str]) -> None:
         if not isinstance(form, Form):
             raise self.fail(form, f"wanted a condition, got '{form.text}'")
         head, rest = form.head, form.items[1:]
@@ -475,12 +475,12 @@ class _Reader:
         else:
             self.atom(form, variables)
 
-    def quantified(self, form: Form, variables: Mapping[str, str]) -> tuple[dict[str, str], Word | Form]:
+    def quantified(self, form: Form, variables: Mapping[str, str]) -> tuple[dict[str, str], PddlWord | Form]:
         if len(form.items) != 3 or not isinstance(form.items[1], Form):
             raise self.fail(form, f"wanted ({form.head} (?x …) …)")
         return self.scope(self.typed(form.items[1].items), variables), form.items[2]
 
-    def effect(self, form: Word | Form, variables: Mapping[str, str]) -> None:
+    def effect(self, form: PddlWord | Form, variables: Mapping[str, str]) -> None:
         if not isinstance(form, Form):
             raise self.fail(form, f"wanted an effect, got '{form.text}'")
         head, rest = form.head, form.items[1:]
@@ -509,9 +509,9 @@ class _Reader:
             self.stated(form, "an effect")
             self.atom(form, variables)
 
-    def number(self, item: Word | Form, variables: Mapping[str, str]) -> None:
+    def number(self, item: PddlWord | Form, variables: Mapping[str, str]) -> None:
         """Check a number, a function term or an arithmetic expression."""
-        if isinstance(item, Word):
+        if isinstance(item, PddlWord):
             self.constant(item)
         elif item.head in ("+", "-", "*", "/"):
             many = item.head in "+*"
@@ -526,7 +526,7 @@ class _Reader:
         else:
             self.atom(item, variables, self.pddl.functions, "function")
 
-    def constant(self, word: Word | Form) -> Fraction:
+    def constant(self, word: PddlWord | Form) -> Fraction:
         text = self.word(word, "a number").text
         if not re.fullmatch(r"[+-]?(\d{1,30}\.?\d{0,30}|\.\d{1,30})(e[+-]?\d{1,2})?", text):
             raise self.fail(word, f"wanted a number, got '{text}'")
@@ -565,7 +565,7 @@ class _Reader:
         """Return whether some declared type is a subtype of both given types."""
         return any({kind, declared.type} <= set(self.pddl.above(lower)) for lower in self.pddl.types)
 
-    def term(self, item: Word | Form, variables: Mapping[str, str]) -> str:
+    def term(self, item: PddlWord | Form, variables: Mapping[str, str]) -> str:
         """Return the type of a variable or object, which must be declared."""
         word = self.word(item, "a variable or an object")
         if word.text.startswith("?"):
@@ -578,7 +578,7 @@ class _Reader:
             raise self.fail(word, f"undefined object '{word.text}'")
         return self.pddl.objects[word.text]
 
-    def fact(self, item: Word | Form) -> None:
+    def fact(self, item: PddlWord | Form) -> None:
         """Parse one element of ``:init``: an atom, a negated atom, the value of a function or a timed initial literal."""
         if not isinstance(item, Form):
             raise self.fail(item, f"wanted a fact, got '{item.text}'")
@@ -586,7 +586,7 @@ class _Reader:
             self.timed_fact(item)
             return
         if item.head == "=":
-            names = [word.text for word in item.items[1:] if isinstance(word, Word)]
+            names = [word.text for word in item.items[1:] if isinstance(word, PddlWord)]
             if len(names) == 2 and names[0] == names[1] in self.pddl.objects:
                 return  # the equality (= a a) always holds
             if len(item.items) != 3 or not isinstance(item.items[1], Form):
@@ -612,6 +612,6 @@ class _Reader:
         self.pddl.timed.append((seconds, self.atom(inner, {}), true))
 
 
-def _formed(at: Form, head: str, *items: Word | Form) -> Form:
+def _formed(at: Form, head: str, *items: PddlWord | Form) -> Form:
     """Return a form (a list of PDDL) with a given first word, at the position of another form."""
-    return Form((Word(head, at.line, at.column), *items), at.line, at.column)
+    return Form((PddlWord(head, at.line, at.column), *items), at.line, at.column)

@@ -10,8 +10,8 @@ from typing import Protocol
 from confab.reasoner.amounts import Expression
 from confab.reasoner.pddl.declarations import Action, Pddl
 from confab.reasoner.pddl.durative import Durative
-from confab.reasoner.pddl.forms import Effect, NumericEffect, conjuncts, effects_of, numeric_of, words_of
-from confab.reasoner.pddl.words import Form, Word
+from confab.reasoner.pddl.forms import NumericEffect, PddlEffect, conjuncts, effects_of, numeric_of, words_of
+from confab.reasoner.pddl.words import Form, PddlWord
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -32,7 +32,7 @@ SPANS = {"start": Span.START, "all": Span.THROUGHOUT, "end": Span.END}
 MOMENT, PASSED = "Moment", "passed"
 
 
-class Variables(Protocol):
+class QuantifiedVariables(Protocol):
     """Protocol for the quantified variables of one behaviour, which `confab.reasoner.pddl.importing` implements."""
 
     def condition(
@@ -41,7 +41,7 @@ class Variables(Protocol):
         """Yield conditions whose conjunction is equivalent to a PDDL formula, or to its negation if `negated`."""
 
 
-class Table(Protocol):
+class TimedNames(Protocol):
     """Protocol for the names and translations of a problem, which `confab.reasoner.pddl.importing` implements."""
 
     pddl: Pddl
@@ -53,28 +53,34 @@ class Table(Protocol):
     def simplified(self, conditions: Iterable[Condition]) -> tuple[Condition, ...] | None:
         """Return a conjunction without the conjuncts that always hold; return None if the conjunction never holds."""
 
-    def number(self, item: Word | Form, named: Mapping[str, str]) -> Expression:
+    def number(self, item: PddlWord | Form, named: Mapping[str, str]) -> Expression:
         """Return the translation of a number, a function or an arithmetic expression."""
 
     def value_effects(
-        self, effects: Sequence[Effect], variables: Variables, conditions: Sequence[Condition]
+        self, effects: Sequence[PddlEffect], variables: QuantifiedVariables, conditions: Sequence[Condition]
     ) -> tuple[ValueEffect, ...]:
         """Return the effects on values that are equivalent to PDDL effects on atoms."""
 
     def amount_effects(
-        self, name: str, effects: Sequence[NumericEffect], variables: Variables, conditions: Sequence[Condition]
+        self,
+        name: str,
+        effects: Sequence[NumericEffect],
+        variables: QuantifiedVariables,
+        conditions: Sequence[Condition],
     ) -> tuple[AmountEffect, ...]:
         """Return the effects on amounts that are equivalent to PDDL effects on functions."""
 
 
-def timing(table: Table, parts: Durative, variables: Variables, conditions: Sequence[Condition]) -> Timing:
+def timing(
+    table: TimedNames, parts: Durative, variables: QuantifiedVariables, conditions: Sequence[Condition]
+) -> Timing:
     """Return the duration, conditions and effects of a durative action.
 
     Parameters
     ----------
-    table : Table
+    table : TimedNames
     parts : Durative
-    variables : Variables
+    variables : QuantifiedVariables
         The quantified variables of the behaviour.
     conditions : sequence of Condition
         The preconditions of the equivalent instantaneous action.
@@ -94,7 +100,7 @@ def timing(table: Table, parts: Durative, variables: Variables, conditions: Sequ
     return Timing(table.number(parts.duration, {}), (), tuple(dict.fromkeys(asked)), tuple(dict.fromkeys(made)))
 
 
-def snapped(pddl: Pddl, effects: Mapping[str, Sequence[Effect]]) -> tuple[Pddl, dict[str, tuple[Effect, ...]]]:
+def snapped(pddl: Pddl, effects: Mapping[str, Sequence[PddlEffect]]) -> tuple[Pddl, dict[str, tuple[PddlEffect, ...]]]:
     """Return a domain with a start action and an end action for each durative action; also return the effects of all actions.
 
     Invariant synthesis works on the returned domain. The synthesis recognises a deletion only if the same action requires the
@@ -102,7 +108,7 @@ def snapped(pddl: Pddl, effects: Mapping[str, Sequence[Effect]]) -> tuple[Pddl, 
     end may then add a fact in place of a deleted fact.
     """
     actions: dict[str, Action] = {}
-    found: dict[str, tuple[Effect, ...]] = {}
+    found: dict[str, tuple[PddlEffect, ...]] = {}
     for name, action in pddl.actions.items():
         parts = action.durative
         if parts is None:
@@ -129,12 +135,15 @@ def snapped(pddl: Pddl, effects: Mapping[str, Sequence[Effect]]) -> tuple[Pddl, 
     return replace(pddl, actions=actions), found
 
 
-def _all(forms: Sequence[Form], place: Word) -> Form | None:
-    return Form((Word("and", place.line, place.column), *forms), place.line, place.column) if forms else None
+def _all(forms: Sequence[Form], place: PddlWord) -> Form | None:
+    return Form((PddlWord("and", place.line, place.column), *forms), place.line, place.column) if forms else None
 
 
 def happenings(
-    table: Table, variables: Variables, situations: dict[str, SituationType], classes: dict[str, tuple[str, ...]]
+    table: TimedNames,
+    variables: QuantifiedVariables,
+    situations: dict[str, SituationType],
+    classes: dict[str, tuple[str, ...]],
 ) -> tuple[list[Behavior], dict[Symbol, str], Times | None]:
     """Return the behaviours for timed initial literals, a goal, and the times of the behaviours.
 
@@ -152,7 +161,7 @@ def happenings(
     situations[passed] = SituationType(passed, (kind,), "Truth", default=FALSE, boolean=True)
     behaviors, times, before = [], dict[str, Fraction](), dict[str, ValueCondition]()
     for number, (time, name) in enumerate(zip(moments, names, strict=True), start=1):
-        its = tuple(Effect(atom, true) for at, atom, true in pddl.timed if at == time)
+        its = tuple(PddlEffect(atom, true) for at, atom, true in pddl.timed if at == time)
         effects = (*table.value_effects(its, variables, ()), ValueEffect(passed, (name,), TRUE))
         asked = (*before.values(), ValueCondition(passed, (name,), FALSE))
         action = table.name("action", f"happening {number}", f"HAPPENING_{number}")

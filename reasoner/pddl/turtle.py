@@ -53,7 +53,7 @@ HEADER = f"""\
 CORE_CLASSES = ("Object", "Truth", "Hand", "Robot")
 Said = Mapping[str, str]
 """Mapping from names to labels, for example to the original PDDL names."""
-_Stated: TypeAlias = "tuple[str, str, str, Properties]"
+_TurtleFact: TypeAlias = "tuple[str, str, str, Properties]"
 """A fact: its subject, its value property (or an empty text), its value, and the properties of its node. Only a fact without a
 value property has a node.
 """
@@ -338,7 +338,7 @@ class _SceneWriter:
             number += 1
             yield f"{self.individual.statement(f':fact{number}', 'SituatedObjectInstance', properties)} ."
 
-    def values(self) -> Iterator[_Stated]:
+    def values(self) -> Iterator[_TurtleFact]:
         """Yield the initial values of symbols, except default values and rest values."""
         for symbol, value in self.problem.initial.items():
             situation = self.problem.domain.situations[symbol.situation]
@@ -354,7 +354,7 @@ class _SceneWriter:
                 properties = self.individual.symbol(symbol.situation, symbol.arguments)
                 yield symbol.arguments[0], prop, amount, {**properties, "amount": [amount]}
 
-    def tuples(self) -> Iterator[_Stated]:
+    def tuples(self) -> Iterator[_TurtleFact]:
         """Yield the rows of static relations."""
         for relation, tuples in self.problem.relations.items():
             prop = self.iri(relation) if all(len(row) == 2 for row in tuples) else ""

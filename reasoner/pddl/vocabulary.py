@@ -11,7 +11,7 @@ from confab.reasoner.amounts import Amount, Calculation, Expression, Measure
 from confab.reasoner.language import walk
 from confab.reasoner.pddl.formulas import FALSE as NEVER
 from confab.reasoner.pddl.formulas import TRUE as ALWAYS
-from confab.reasoner.pddl.formulas import Atom, Formula, FunctionTerm, Number, Operation, Term, both
+from confab.reasoner.pddl.formulas import Arithmetic, Atom, Formula, FunctionTerm, NumericTerm, PddlTerm, both
 from confab.reasoner.symbols import TRUE, Problem, Witness
 
 WORLD = "World"
@@ -25,7 +25,7 @@ sometime sometime-after sometime-before start total-cost total-time types undefi
 """Reserved words of PDDL, which can't be names."""
 
 
-class Vocabulary:
+class PddlNames:
     """Mapping from the names of a problem to PDDL names.
 
     All PDDL names are different: even a type and an object have different names, because some parsers have one table for all
@@ -90,34 +90,34 @@ class Vocabulary:
         """Return the classes that become types, sorted from large to small."""
         return sorted(self.types, key=lambda kind: -len(self.problem.members(kind)))
 
-    def variable(self, name: str, kind: str) -> Term:
+    def variable(self, name: str, kind: str) -> PddlTerm:
         """Return a PDDL variable for the individuals of a class."""
-        return Term(name, self.types.get(kind, "object"), self.problem.members(kind))
+        return PddlTerm(name, self.types.get(kind, "object"), self.problem.members(kind))
 
-    def object(self, ours: str) -> Term:
+    def object(self, ours: str) -> PddlTerm:
         """Return the PDDL object for an individual."""
-        return Term(self.name("object", ours), self.lowest.get(ours, "object"), frozenset((ours,)))
+        return PddlTerm(self.name("object", ours), self.lowest.get(ours, "object"), frozenset((ours,)))
 
     # ----------------------------------------------------------------------------------------------------- predicates
 
-    def atom(self, predicate: str, terms: Sequence[Term]) -> Atom:
+    def atom(self, predicate: str, terms: Sequence[PddlTerm]) -> Atom:
         """Return an atom, and record the predicate's number of arguments."""
         self.arity[predicate] = len(terms)
         return Atom(predicate, tuple(terms))
 
-    def about(self, situation: str, terms: Sequence[Term]) -> tuple[Term, ...]:
+    def about(self, situation: str, terms: Sequence[PddlTerm]) -> tuple[PddlTerm, ...]:
         """Return the arguments of a symbol, except the individual that stands for the world."""
         kinds = self.situations[situation].arguments
         one = len(self.problem.classes.get(WORLD, ())) == 1
         return tuple(term for kind, term in zip(kinds, terms, strict=True) if not (one and kind == WORLD))
 
-    def value(self, situation: str, terms: Sequence[Term], value: Term | None) -> Atom:
+    def value(self, situation: str, terms: Sequence[PddlTerm], value: PddlTerm | None) -> Atom:
         """Return the atom which states that a symbol has a value or, if `value` is None, that a boolean symbol is true."""
         self.used[situation] = None
         words = self.about(situation, terms)
         return self.atom(self.name("predicate", situation), words if value is None else (*words, value))
 
-    def is_a(self, term: Term, kind: str) -> Formula:
+    def is_a(self, term: PddlTerm, kind: str) -> Formula:
         """Return the formula for membership of a term in a class; the formula is constant if its truth is known."""
         members = self.problem.members(kind)
         if term.members <= members:
@@ -126,17 +126,17 @@ class Vocabulary:
             return NEVER
         return self.static(f"is {kind}", f"is_{kind}", frozenset((member,) for member in members), (term,))
 
-    def guard(self, term: Term, kind: str) -> Formula:
+    def guard(self, term: PddlTerm, kind: str) -> Formula:
         """Return the formula for membership of a variable in its class; the formula is constant if the class is a PDDL type."""
         if kind in self.types:
             return ALWAYS
         return self.static(f"is {kind}", f"is_{kind}", frozenset((one,) for one in self.problem.members(kind)), (term,))
 
-    def relation(self, relation: str, terms: Sequence[Term]) -> Formula:
+    def relation(self, relation: str, terms: Sequence[PddlTerm]) -> Formula:
         """Return the formula which states that a static relation holds for some terms."""
         return self.static(f"relation {relation}", relation, self.problem.relations.get(relation, frozenset()), terms)
 
-    def differs(self, term: Term, constant: Term) -> Formula:
+    def differs(self, term: PddlTerm, constant: PddlTerm) -> Formula:
         """Return the formula which states that a term doesn't denote a given individual.
 
         The formula for "different from an individual" uses a predicate instead of PDDL's equality.
@@ -147,7 +147,7 @@ class Vocabulary:
         )
         return found if term.members & constant.members else ALWAYS
 
-    def static(self, ours: str, wanted: str, rows: frozenset[tuple[str, ...]], terms: Sequence[Term]) -> Formula:
+    def static(self, ours: str, wanted: str, rows: frozenset[tuple[str, ...]], terms: Sequence[PddlTerm]) -> Formula:
         """Return the atom of a static predicate with the given rows, or a constant formula if the truth of the atom is known."""
         if not rows:
             return NEVER
@@ -157,7 +157,7 @@ class Vocabulary:
         self.statics[name] = rows
         return self.atom(name, terms)
 
-    def total(self, situation: str, terms: Sequence[Term]) -> bool:
+    def total(self, situation: str, terms: Sequence[PddlTerm]) -> bool:
         """Return whether the symbols of a situation type exist for all individuals that some terms can denote."""
         kind = self.situations[situation]
         within = all(t.members <= self.problem.members(k) for k, t in zip(kind.arguments, terms, strict=True))
@@ -175,7 +175,7 @@ class Vocabulary:
             number *= len(self.problem.classes.get(kind, ()))
         return number
 
-    def exists(self, situation: str, terms: Sequence[Term]) -> Formula:
+    def exists(self, situation: str, terms: Sequence[PddlTerm]) -> Formula:
         """Return the formula which states that the symbol of a situation type exists for some terms."""
         kind = self.situations[situation]
         if self.total(situation, terms):
@@ -187,19 +187,19 @@ class Vocabulary:
 
     # -------------------------------------------------------------------------------------------------------- numbers
 
-    def amount(self, situation: str, terms: Sequence[Term]) -> FunctionTerm:
+    def amount(self, situation: str, terms: Sequence[PddlTerm]) -> FunctionTerm:
         """Return the PDDL function term for an amount."""
         name = self.name("function", situation, situation)
         self.counted[situation] = name
         return self.call(name, self.about(situation, terms))
 
-    def measure(self, relation: str, terms: Sequence[Term]) -> FunctionTerm:
+    def measure(self, relation: str, terms: Sequence[PddlTerm]) -> FunctionTerm:
         """Return the PDDL function term for a static relation whose last argument is a number."""
         name = self.name("function", f"relation {relation}", relation)
         self.measured[relation] = name
         return self.call(name, terms)
 
-    def call(self, name: str, terms: Sequence[Term]) -> FunctionTerm:
+    def call(self, name: str, terms: Sequence[PddlTerm]) -> FunctionTerm:
         """Return a function term, and record the types of its arguments."""
         for types, term in zip(self.functions.setdefault(name, [set() for _ in terms]), terms, strict=True):
             types.add(term.type)
@@ -216,7 +216,7 @@ class Vocabulary:
             yield kind
             kind = self.above[kind]
 
-    def number(self, expression: Expression, terms: Mapping[str, Term]) -> Number:
+    def number(self, expression: Expression, terms: Mapping[str, PddlTerm]) -> NumericTerm:
         """Return the PDDL expression for a numeric expression, with PDDL terms substituted for variables."""
         match expression:
             case Amount(situation, arguments):
@@ -224,11 +224,11 @@ class Vocabulary:
             case Measure(relation, arguments):
                 return self.measure(relation, self.terms(arguments, terms))
             case Calculation(sign, left, right):
-                return Operation(sign, self.number(left, terms), self.number(right, terms))
+                return Arithmetic(sign, self.number(left, terms), self.number(right, terms))
             case Fraction():
                 return expression
 
-    def there(self, expression: Expression, terms: Mapping[str, Term]) -> Iterator[Formula]:
+    def there(self, expression: Expression, terms: Mapping[str, PddlTerm]) -> Iterator[Formula]:
         """Yield the formulas which state that all amounts and measures in a numeric expression exist."""
         match expression:
             case Amount(situation, arguments):
@@ -244,7 +244,7 @@ class Vocabulary:
             case Fraction():
                 return
 
-    def terms(self, names: Sequence[str], terms: Mapping[str, Term]) -> tuple[Term, ...]:
+    def terms(self, names: Sequence[str], terms: Mapping[str, PddlTerm]) -> tuple[PddlTerm, ...]:
         """Return the PDDL terms for names of variables and individuals."""
         return tuple(terms[name] if name in terms else self.object(name) for name in names)
 
@@ -262,7 +262,7 @@ class Vocabulary:
         for situation in sorted(self.counted):  # many planners require an initial value for all arguments of a function
             kinds = self.situations[situation].arguments
             types = iter(map(self.common, self.functions[self.counted[situation]]))
-            kept = self.about(situation, [Term(str(place)) for place in range(len(kinds))])
+            kept = self.about(situation, [PddlTerm(str(place)) for place in range(len(kinds))])
             wide = {int(term.name): next(types) for term in kept}
             things = [
                 [one for one in every if wide[i] in ("object", *self.upwards(self.lowest.get(one, "object")))]

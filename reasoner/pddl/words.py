@@ -11,7 +11,7 @@ TOKEN = re.compile(r"[()]|-(?=[A-Za-z])|[^\s();?]+|\?[^\s();?]*|;[^\n]*|\s+")
 
 
 @dataclass(frozen=True)
-class Word:
+class PddlWord:
     """A name or number in lower case, with its line and column."""
 
     text: str
@@ -23,14 +23,14 @@ class Word:
 class Form:
     """A list in parentheses, with its line and column."""
 
-    items: tuple[Word | Form, ...]
+    items: tuple[PddlWord | Form, ...]
     line: int
     column: int
 
     @property
     def head(self) -> str:
         """The first item of the list if the item is a word, otherwise an empty text."""
-        return self.items[0].text if self.items and isinstance(self.items[0], Word) else ""
+        return self.items[0].text if self.items and isinstance(self.items[0], PddlWord) else ""
 
 
 class PddlError(ValueError):
@@ -39,7 +39,7 @@ class PddlError(ValueError):
 
 def form_of(text: str, file: str) -> Form:
     """Parse a PDDL text, which must consist of a single list, and return this list."""
-    stack: list[tuple[list[Word | Form], int, int]] = []
+    stack: list[tuple[list[PddlWord | Form], int, int]] = []
     line, start = 1, 0
     done: Form | None = None
     for match in TOKEN.finditer(text):
@@ -65,7 +65,7 @@ def form_of(text: str, file: str) -> Form:
         elif not stack:
             raise PddlError(f"{file}:{line}:{column}: wanted '(define …', got '{token[:40]}'")
         else:
-            stack[-1][0].append(Word(token.lower(), line, column))
+            stack[-1][0].append(PddlWord(token.lower(), line, column))
     if stack:
         _, row, col = stack[-1]
         raise PddlError(f"{file}:{row}:{col}: this '(' is never closed")
@@ -74,6 +74,6 @@ def form_of(text: str, file: str) -> Form:
     return done
 
 
-def is_number(item: Word | Form) -> bool:
+def is_number(item: PddlWord | Form) -> bool:
     """Return whether an item is a number."""
-    return isinstance(item, Word) and re.fullmatch(r"[+-]?[0-9.]+", item.text) is not None
+    return isinstance(item, PddlWord) and re.fullmatch(r"[+-]?[0-9.]+", item.text) is not None

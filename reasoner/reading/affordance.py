@@ -110,7 +110,7 @@ def _following(graph: KnowledgeGraph, reading: Reading) -> Iterator[Symbol]:
 
     The caller must add each fact to the graph before the caller requests the next fact.
     """
-    rules, writer = reading.problem.domain.rules, _Writer(graph, reading)
+    rules, writer = reading.problem.domain.rules, _PatternWriter(graph, reading)
     again = circular(rules)
     for group in strata(rules):
         seen, grown = set[Symbol](), True
@@ -144,7 +144,7 @@ def applicable_query(
     The query reads the graph `SITUATION`, which `write_situation` fills. `when` contains further conditions, in addition to the
     preconditions.
     """
-    return _Writer(graph, reading).query(behavior, when)
+    return _PatternWriter(graph, reading).query(behavior, when)
 
 
 def affordances(graph: KnowledgeGraph, reading: Reading, state: State | None = None) -> list[Affordance]:
@@ -163,7 +163,7 @@ def affordances(graph: KnowledgeGraph, reading: Reading, state: State | None = N
     cup1 CLEAR_AWAY cup1 PLACE counter_right
     """
     write_situation(graph, reading, state)
-    writer = _Writer(graph, reading)
+    writer = _PatternWriter(graph, reading)
     found = []
     for behavior in reading.problem.domain.behaviors.values():
         for bindings in writer.rows(behavior):
@@ -238,7 +238,7 @@ def _may_coincide(one: AmountEffect, other: AmountEffect) -> bool:
     return all(a == b or a.startswith("?") or b.startswith("?") for a, b in pairs)
 
 
-class _Writer:
+class _PatternWriter:
     """Translation of conditions to SPARQL patterns."""
 
     def __init__(self, graph: KnowledgeGraph, reading: Reading) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import product
 
 from confab.reasoner.amounts import Measure, written
-from confab.reasoner.condition_nodes import Node
+from confab.reasoner.condition_nodes import NodeValues
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.language import measured, walk
 from confab.reasoner.names import Names
@@ -21,7 +21,7 @@ from confab.reasoner.vocabulary import CORE
 
 def facts_of(
     rows: Iterable[tuple[str, ...]],
-    tuples: Mapping[str, Node],
+    tuples: Mapping[str, NodeValues],
     properties: Mapping[str, tuple[str, bool]],
     domain: Domain,
     names: Names,

@@ -24,7 +24,7 @@ from confab.reasoner.reading.rows import (
     HIGHEST_LEVEL,
     HIGHEST_NUMBER,
     Member,
-    Schema,
+    OntologySchema,
     classes_of,
     derived_goals,
     is_a,
@@ -61,7 +61,7 @@ class _Whole(Names):
         return True
 
 
-def as_written(schema: Schema, behaviors: Iterable[str]) -> dict[str, Behavior]:
+def as_written(schema: OntologySchema, behaviors: Iterable[str]) -> dict[str, Behavior]:
     """Return the given behaviours as written: names are IRIs, and classes aren't replaced by their definitions."""
     names = _Whole(())
     terms = set(schema.of_kind("Parameter", "Variable"))
@@ -78,7 +78,7 @@ class Frame:
     contains the behaviours whose effects on all members of a class aren't yet expanded to one effect per member.
     """
 
-    schema: Schema
+    schema: OntologySchema
     parts: Parts
     domain: Domain
     classes: dict[str, tuple[str, ...]]
@@ -93,7 +93,7 @@ class Frame:
 
 
 def frame(
-    schema: Schema,
+    schema: OntologySchema,
     members: Sequence[Member],
     namesakes: Collection[str] = (),
     earlier: Frame | None = None,
@@ -148,7 +148,7 @@ def frame(
     return Frame(schema, parts, domain, classes, parents, properties, lifted)
 
 
-def names_of(schema: Schema, members: Iterable[Member], namesakes: Iterable[str] = ()) -> Names:
+def names_of(schema: OntologySchema, members: Iterable[Member], namesakes: Iterable[str] = ()) -> Names:
     """Return unique short names for a schema's terms, some individuals, and other IRIs with the same local names."""
     nodes = schema.nodes
     typed = (nodes[iri] for iri in schema.of_kind("Parameter", "Variable", *WITH_CLASS))
@@ -167,7 +167,9 @@ def names_of(schema: Schema, members: Iterable[Member], namesakes: Iterable[str]
     )
 
 
-def _rules(parts: Parts, schema: Schema, situations: Mapping[str, SituationType]) -> dict[str, tuple[Rule, ...]]:
+def _rules(
+    parts: Parts, schema: OntologySchema, situations: Mapping[str, SituationType]
+) -> dict[str, tuple[Rule, ...]]:
     """Return the rules of each derived situation type.
 
     A rule is stated, or follows from a class definition or from an axiom about the value property.
@@ -239,7 +241,7 @@ def _rules(parts: Parts, schema: Schema, situations: Mapping[str, SituationType]
 
 def _aggregates(
     parts: Parts,
-    schema: Schema,
+    schema: OntologySchema,
     situations: Mapping[str, SituationType],
     rules: Mapping[str, Sequence[Rule]],
     constraints: Mapping[str, Constraint],
@@ -290,7 +292,7 @@ def _aggregates(
         raise KnowledgeError(str(error), parts.names.iri(str(error).split()[0])) from None
 
 
-def _constraints(parts: Parts, schema: Schema, situations: Iterable[SituationType]) -> dict[str, Constraint]:
+def _constraints(parts: Parts, schema: OntologySchema, situations: Iterable[SituationType]) -> dict[str, Constraint]:
     """Return the constraints by the name of the amount that counts their violations.
 
     Raises
@@ -337,7 +339,7 @@ def _on_their_levels(
     yield from known.values()
 
 
-def _definitions(schema: Schema, names: Names) -> Definitions:
+def _definitions(schema: OntologySchema, names: Names) -> Definitions:
     """Return the definitions of classes and situation types, with the domains and ranges of properties."""
     properties, kinds = _value_properties(schema), dict[str, tuple[str, str]]()
     owners: dict[str, list[str]] = defaultdict(list)
@@ -361,7 +363,7 @@ def _definitions(schema: Schema, names: Names) -> Definitions:
     return replace(found, concluded=concluded)
 
 
-def _value_properties(schema: Schema) -> dict[str, tuple[str, bool]]:
+def _value_properties(schema: OntologySchema) -> dict[str, tuple[str, bool]]:
     """Return the situation type of each value property, and whether the property is functional."""
     return {
         prop: (iri, iri not in schema.pairs)
@@ -401,7 +403,7 @@ def _check_behavior(behavior: Behavior, domain: Domain) -> None:
 
 
 def _situations(
-    schema: Parts, read: Schema, classes: dict[str, tuple[str, ...]]
+    schema: Parts, read: OntologySchema, classes: dict[str, tuple[str, ...]]
 ) -> tuple[list[SituationType], dict[str, tuple[str, bool]]]:
     """Return the sorted situation types, and a mapping of each value property to its situation type.
 

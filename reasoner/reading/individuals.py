@@ -8,11 +8,11 @@ from itertools import chain
 
 import pyoxigraph as ox
 
-from confab.reasoner.condition_nodes import Node
+from confab.reasoner.condition_nodes import NodeValues
 from confab.reasoner.graph.knowledge import SCENE, KnowledgeGraph, text
 from confab.reasoner.limits import check
 from confab.reasoner.reading.frame import Frame
-from confab.reasoner.reading.rows import FIRST_INDEX_OF_NONE, Member, Schema, Triple, index_of, link, stated
+from confab.reasoner.reading.rows import FIRST_INDEX_OF_NONE, Member, OntologySchema, Triple, index_of, link, stated
 from confab.reasoner.reading.swrl import SWRL
 from confab.reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, OWL, RDF, TYPE
 
@@ -36,7 +36,7 @@ class Individuals:
     seen : set of individuals
     """
 
-    def __init__(self, graph: KnowledgeGraph, schema: Schema) -> None:
+    def __init__(self, graph: KnowledgeGraph, schema: OntologySchema) -> None:
         self.graph, self.schema = graph, schema
         self.subclasses: dict[str, list[str]] = {}
         for kind, supers in schema.supers.items():
@@ -117,7 +117,7 @@ class Individuals:
         wanted, seen, numbers = known.properties.keys() | self.schema.nodes.keys(), self.seen, self.schema.numbers
         return [(s, p, o) for s, p, o in self.triples if p in wanted and s in seen and (o in seen or p in numbers)]
 
-    def tuples(self) -> dict[str, Node]:
+    def tuples(self) -> dict[str, NodeValues]:
         """Return the facts that are nodes and mention only individuals in `seen`."""
         nodes = self.schema.nodes
         facts = (
@@ -138,7 +138,7 @@ def values_of(iris: Iterable[str]) -> str:
     return " ".join(f"<{iri}>" for iri in iris if not NO_IRI.search(iri))
 
 
-def constants_of(schema: Schema) -> set[str]:
+def constants_of(schema: OntologySchema) -> set[str]:
     """Return the individuals in the conditions, effects and definitions of a schema, and its rest values and default values."""
     goals = goal_conditions(schema)
     names = (*PLACES, CORE + "restValue", CORE + "defaultValue")
@@ -152,6 +152,6 @@ def constants_of(schema: Schema) -> set[str]:
     return (found - set(schema.nodes) - schema.individuals_of) | {CORE + "true", CORE + "false"}
 
 
-def goal_conditions(schema: Schema) -> set[str]:
+def goal_conditions(schema: OntologySchema) -> set[str]:
     """Return the nodes of all goals of tasks."""
     return {iri for node in schema.nodes.values() for iri in node.get(CORE + "goal", ())}

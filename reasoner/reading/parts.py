@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from confab.reasoner.afterwards import closed
 from confab.reasoner.amounts import OPERATIONS, Amount, Expression, Measure, terms_of
-from confab.reasoner.condition_nodes import Node, NodeReader
+from confab.reasoner.condition_nodes import NodeReader, NodeValues
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.language import groups, mentions
 from confab.reasoner.names import Names, local_name
@@ -43,7 +43,7 @@ class Parts(NodeReader):
     """Reader of the nodes of behaviours, conditions and situation types."""
 
     error: ClassVar[type[ValueError]] = KnowledgeError
-    nodes: Mapping[str, Node]
+    nodes: Mapping[str, NodeValues]
     names: Names
     terms: set[str]
     pairs: set[str]  # situation types with a many-valued value property
@@ -392,5 +392,5 @@ def _plain(condition: Condition) -> bool:
     return not groups(condition)
 
 
-def _is_part(node: Node) -> bool:
+def _is_part(node: NodeValues) -> bool:
     return not is_a(node, "Behavior", "SituationType", "Task", "Relation", "ReachRelation", "Level", "Window")

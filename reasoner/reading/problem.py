@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 from confab.reasoner.aggregates.compiling import compiled
 from confab.reasoner.aggregates.totals import exceptions, with_totals
-from confab.reasoner.condition_nodes import Node
+from confab.reasoner.condition_nodes import NodeValues
 from confab.reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
 from confab.reasoner.language import DomainError
 from confab.reasoner.limits import check
@@ -29,7 +29,7 @@ from confab.reasoner.names import Names, brief
 from confab.reasoner.reading.facts import check_values, facts_of, initial_state
 from confab.reasoner.reading.frame import Frame, frame, names_of
 from confab.reasoner.reading.goals import with_task
-from confab.reasoner.reading.rows import Member, Schema, Triple, core_triple, index_of, nodes_of, stated
+from confab.reasoner.reading.rows import Member, OntologySchema, Triple, core_triple, index_of, nodes_of, stated
 from confab.reasoner.reading.schema import read_schema
 from confab.reasoner.reading.times import with_times
 from confab.reasoner.symbols import Problem
@@ -64,17 +64,17 @@ class Reading:
 
     problem: Problem
     names: Names
-    schema: Schema
+    schema: OntologySchema
     whole: bool = True
 
 
-def read(graph: KnowledgeGraph, schema: Schema | None = None) -> Reading:
+def read(graph: KnowledgeGraph, schema: OntologySchema | None = None) -> Reading:
     """Return the planning problem of a knowledge graph, with all of its individuals.
 
     Parameters
     ----------
     graph : KnowledgeGraph
-    schema : Schema, optional
+    schema : OntologySchema, optional
         The result of `read_schema`, if this result is known already.
 
     Raises
@@ -105,7 +105,7 @@ def _members(graph: KnowledgeGraph) -> list[Member]:
 
 
 def reading_of(
-    scene: str, known: Frame, facts: Iterable[Triple], tuples: Mapping[str, Node], whole: bool = True
+    scene: str, known: Frame, facts: Iterable[Triple], tuples: Mapping[str, NodeValues], whole: bool = True
 ) -> Reading:
     """Return the planning problem with the individuals of a frame.
 

@@ -41,7 +41,7 @@ from confab.reasoner.reading.individuals import (
 )
 from confab.reasoner.reading.problem import Reading, read, reading_of
 from confab.reasoner.reading.remembering import concerns_the_past
-from confab.reasoner.reading.rows import Member, Schema, Triple, derived_goals
+from confab.reasoner.reading.rows import Member, OntologySchema, Triple, derived_goals
 from confab.reasoner.reading.schema import read_schema
 from confab.reasoner.symbols import (
     FALSE,
@@ -113,7 +113,7 @@ def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
         return replace(reading, problem=with_goals(reading.problem, goals))
     constants = constants_of(schema)
     seeds = _goal_individuals(schema) | _named(graph, schema, goals)
-    search = _Search(graph, schema)
+    search = _RouteSearch(graph, schema)
     if nameless := sorted(term for term in seeds | constants if ":" not in term):
         raise KnowledgeError(
             f"a condition, an effect or a goal leads to something without a name (_:{nameless[0]}), where an individual belongs"
@@ -252,14 +252,14 @@ def _given(effect: Effect, looked_up: LookedUp) -> Iterator[frozenset[str]]:
 
 
 @dataclass(frozen=True)
-class _Scope:
+class _TypedConjunction:
     """A conjunction with the classes of its terms: a behaviour's positive preconditions, possibly with a nested conjunction."""
 
     conditions: tuple[Condition, ...]
     kinds: Mapping[str, str]
 
 
-def _scopes(conditions: Sequence[Condition], kinds: Mapping[str, str]) -> list[_Scope]:
+def _scopes(conditions: Sequence[Condition], kinds: Mapping[str, str]) -> list[_TypedConjunction]:
     """Return the conjunctions that conditions contain, including nested conjunctions.
 
     The first conjunction contains the positive conditions. Each further conjunction adds an alternative or a negated conjunction to
@@ -281,13 +281,15 @@ def _scopes(conditions: Sequence[Condition], kinds: Mapping[str, str]) -> list[_
                 groups += [(alternative, {}) for alternative in alternatives]
             case leaf:
                 leaves.append(leaf)
-    found = [_Scope(tuple(leaves), kinds)]
+    found = [_TypedConjunction(tuple(leaves), kinds)]
     for inner, bound in groups:
         found += _scopes((*leaves, *inner), {**kinds, **bound})
     return found
 
 
-def _span(scope: _Scope, start: set[str], more: set[str], known: Frame, found: Routes, looked_up: LookedUp) -> None:
+def _span(
+    scope: _TypedConjunction, start: set[str], more: set[str], known: Frame, found: Routes, looked_up: LookedUp
+) -> None:
     """Add the cheapest routes from the terms in `start` to all terms of a conjunction and to the terms in `more`."""
     steps = [step for condition in scope.conditions for step in _steps(condition, scope, known)]
     in_use = more.union(*map(terms, scope.conditions))
@@ -312,7 +314,7 @@ def _span(scope: _Scope, start: set[str], more: set[str], known: Frame, found: R
 
 
 @dataclass(frozen=True)
-class _Step:
+class _Route:
     """A route from one term of a condition to another term: the properties that the route follows, and its cost.
 
     `constants` are the individuals that the source may denote. If the source alone determines the symbol, `looks_up` is None;
@@ -328,7 +330,7 @@ class _Step:
     looks_up: tuple[str, int] | None
 
 
-def _steps(condition: Condition, scope: _Scope, known: Frame) -> Iterator[_Step]:
+def _steps(condition: Condition, scope: _TypedConjunction, known: Frame) -> Iterator[_Route]:
     """Yield the routes along stated facts between any two terms of a positive condition.
 
     A fact that is a node is always followed from its first argument.
@@ -363,7 +365,7 @@ def _steps(condition: Condition, scope: _Scope, known: Frame) -> Iterator[_Step]
         for target in (other for other in arguments if other != source):
             if unstated and target != arguments[-1]:
                 continue
-            yield _Step(
+            yield _Route(
                 source,
                 target,
                 cost,
@@ -374,7 +376,7 @@ def _steps(condition: Condition, scope: _Scope, known: Frame) -> Iterator[_Step]
             )
 
 
-def _constants(term: str, scope: _Scope, known: Frame) -> frozenset[str]:
+def _constants(term: str, scope: _TypedConjunction, known: Frame) -> frozenset[str]:
     """Return the constants that a term may denote."""
     kind = scope.kinds.get(term)
     return frozenset({term} if kind is None else known.classes.get(kind, ()))
@@ -383,7 +385,7 @@ def _constants(term: str, scope: _Scope, known: Frame) -> frozenset[str]:
 # ------------------------------------------------------------------------------------------------- 2. search
 
 
-class _Search(Individuals):
+class _RouteSearch(Individuals):
     """The individuals that task recognition has read, and the search along routes."""
 
     def close(self, fresh: list[Triple], constants: set[str], bounds: Routes) -> None:
@@ -445,7 +447,7 @@ class _Search(Individuals):
         self.visit(far - self.seen, {CORE + "about": far} if self.schema.tuples else None)
 
 
-def _namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member]) -> set[str]:
+def _namesakes(graph: KnowledgeGraph, schema: OntologySchema, members: Sequence[Member]) -> set[str]:
     """Return the IRIs that differ only in the namespace from an individual or class that has been read.
 
     Only known namespaces are searched.
@@ -477,7 +479,7 @@ def _namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member])
     return found
 
 
-def _spaces(graph: KnowledgeGraph, schema: Schema, terms: Iterable[str]) -> set[str]:
+def _spaces(graph: KnowledgeGraph, schema: OntologySchema, terms: Iterable[str]) -> set[str]:
     """Return the namespaces of some terms, of the files' prefixes and of the loaded ontologies."""
     found = {iri.removesuffix(local_name(iri)) for iri in terms if ":" in iri}
     found |= {*graph.prefixes.values()} - ({*PREFIXES.values()} - {CORE})
@@ -487,11 +489,11 @@ def _spaces(graph: KnowledgeGraph, schema: Schema, terms: Iterable[str]) -> set[
     return found
 
 
-def _goal_situations(schema: Schema) -> set[str]:
+def _goal_situations(schema: OntologySchema) -> set[str]:
     return {s for iri in goal_conditions(schema) for s in schema.nodes.get(iri, {}).get(CORE + "situationType", ())}
 
 
-def _goal_individuals(schema: Schema) -> set[str]:
+def _goal_individuals(schema: OntologySchema) -> set[str]:
     """Return the individuals that goals mention, or that facts without arguments mention."""
     goals = [schema.nodes.get(iri, {}) for iri in goal_conditions(schema)]
     nodes = chain(goals, schema.facts.values())
@@ -499,7 +501,7 @@ def _goal_individuals(schema: Schema) -> set[str]:
     return named - schema.individuals_of
 
 
-def _goal_classes(schema: Schema) -> set[str]:
+def _goal_classes(schema: OntologySchema) -> set[str]:
     """Return the classes that stand for all their members in goals, and the classes of the values that goals exclude."""
     goals = [schema.nodes.get(iri, {}) for iri in goal_conditions(schema)]
     wanted = {v for node in goals for name in PLACES for v in node.get(name, ()) if v in schema.individuals_of}
@@ -507,7 +509,7 @@ def _goal_classes(schema: Schema) -> set[str]:
     return wanted | {v for node in negated for v in node.get(CORE + "situationType", ()) if v not in schema.pairs}
 
 
-def _named(graph: KnowledgeGraph, schema: Schema, goals: Sequence[str]) -> set[str]:
+def _named(graph: KnowledgeGraph, schema: OntologySchema, goals: Sequence[str]) -> set[str]:
     """Return the individuals whose short names occur in the texts of goals.
 
     The names are looked up in the known namespaces first, and otherwise among all individuals.

@@ -22,7 +22,7 @@ from confab.reasoner.derivation import circular, needed
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.names import Names, local_name
 from confab.reasoner.reading.parts import Parts
-from confab.reasoner.reading.rows import Schema
+from confab.reasoner.reading.rows import OntologySchema
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -76,7 +76,7 @@ class Past:
         self.situations[name] = SituationType(name, arguments, "Truth", default=FALSE, boolean=True)
 
 
-def iris_of_the_past(schema: Schema) -> Iterator[str]:
+def iris_of_the_past(schema: OntologySchema) -> Iterator[str]:
     """Yield the IRIs of the situation types that express ``:atMostOnce`` and ``:onlyAfter``."""
     for iri in schema.of_kind("SituationType"):
         if CORE + "atMostOnce" in schema.nodes[iri]:
@@ -85,13 +85,13 @@ def iris_of_the_past(schema: Schema) -> Iterator[str]:
             yield from (f"{iri}.{word}.{local_name(other)}" for word in ("without", "after", "before"))
 
 
-def concerns_the_past(schema: Schema) -> bool:
+def concerns_the_past(schema: OntologySchema) -> bool:
     """Return whether a situation type is remembered, or has a constraint that concerns several states."""
     words = {CORE + word for word in ("remembers", "atMostOnce", "onlyAfter")}
     return any(words & schema.nodes[iri].keys() for iri in schema.of_kind("SituationType"))
 
 
-def past(parts: Parts, schema: Schema, situations: Sequence[SituationType]) -> Past:
+def past(parts: Parts, schema: OntologySchema, situations: Sequence[SituationType]) -> Past:
     """Return all situation types, together with the remembered situation types and the constraints that concern several states.
 
     Raises
@@ -124,7 +124,7 @@ def past(parts: Parts, schema: Schema, situations: Sequence[SituationType]) -> P
     return found
 
 
-def _checked(parts: Parts, schema: Schema, found: Past, iri: str) -> str:
+def _checked(parts: Parts, schema: OntologySchema, found: Past, iri: str) -> str:
     """Return the IRI of the original of a remembered situation type; raise `KnowledgeError` if the original can't be remembered."""
     source, name = parts.one(iri, "remembers"), parts.names.short(iri)
     _check_boolean(parts, found, iri, "remembers", iri, source)

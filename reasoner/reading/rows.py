@@ -16,7 +16,7 @@ from confab.reasoner.amounts import (
     exact,
     written,
 )
-from confab.reasoner.condition_nodes import Node
+from confab.reasoner.condition_nodes import NodeValues
 from confab.reasoner.graph.knowledge import KnowledgeError, Term, text
 from confab.reasoner.limits import check
 from confab.reasoner.names import Names, local_name
@@ -55,7 +55,7 @@ Member = tuple[str, str, int]
 
 
 @dataclass(frozen=True)
-class Schema:
+class OntologySchema:
     """The part of an ontology that doesn't depend on individuals: the rows of `SCHEMA`, as IRIs.
 
     `nodes` contains situation types, behaviours with their parts, relations and tasks. `pairs` contains the situation types whose
@@ -67,17 +67,17 @@ class Schema:
     contains the IRIs of the loaded files.
     """
 
-    nodes: Mapping[str, Node]
+    nodes: Mapping[str, NodeValues]
     supers: Mapping[str, Sequence[str]]
     owners: Sequence[tuple[str, str]]
     pairs: frozenset[str]
     whole: frozenset[str]
     from_levels: Mapping[str, int]
-    facts: Mapping[str, Node]
+    facts: Mapping[str, NodeValues]
     tuples: bool
-    expressions: Mapping[str, Node]
-    axioms: Mapping[str, Node]
-    swrl: Mapping[str, Node]
+    expressions: Mapping[str, NodeValues]
+    axioms: Mapping[str, NodeValues]
+    swrl: Mapping[str, NodeValues]
     ontologies: Sequence[str]
     exclusive: frozenset[str] = frozenset()
 
@@ -206,13 +206,13 @@ def whole_number(text: str, what: str, least: int, most: int) -> int:
     return number
 
 
-def is_a(node: Node, *kinds: str) -> bool:
+def is_a(node: NodeValues, *kinds: str) -> bool:
     """Return whether a node is stated to belong to one of some core classes."""
     types = node[TYPE]
     return any(CORE + kind in types for kind in kinds)
 
 
-def ordered(iris: Iterable[str], nodes: Mapping[str, Node], names: Names) -> list[str]:
+def ordered(iris: Iterable[str], nodes: Mapping[str, NodeValues], names: Names) -> list[str]:
     """Return nodes sorted by index, then by name."""
 
     def key(iri: str) -> tuple[int, str]:
@@ -267,7 +267,7 @@ def classes_of(
     return classes, {names.short(sub): tuple(map(names.short, group)) for sub, group in supers.items()}
 
 
-def derived_goals(schema: Schema) -> list[str]:
+def derived_goals(schema: OntologySchema) -> list[str]:
     """Return the goals that aren't facts, for example alternatives, witnesses, and comparisons of two amounts."""
     extrema = {
         situation
@@ -276,7 +276,7 @@ def derived_goals(schema: Schema) -> list[str]:
         for situation in schema.nodes[iri].get(CORE + "situationType", ())
     }
 
-    def fact(node: Node) -> bool:
+    def fact(node: NodeValues) -> bool:
         if is_a(node, "Comparison"):
             plain = (
                 CORE + "amount" in node and not {CORE + name for name in ("left", "right", "relation")} & node.keys()

@@ -8,7 +8,14 @@ from confab.reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGrap
 from confab.reasoner.limits import check
 from confab.reasoner.reading import swrl
 from confab.reasoner.reading.definitions import AXIOMS, EXPRESSIONS
-from confab.reasoner.reading.rows import HIGHEST_LEVEL, Schema, core_triple, nodes_of, superclasses, whole_number
+from confab.reasoner.reading.rows import (
+    HIGHEST_LEVEL,
+    OntologySchema,
+    core_triple,
+    nodes_of,
+    superclasses,
+    whole_number,
+)
 from confab.reasoner.vocabulary import CORE, EMBODIMENT
 
 TEXTS = tuple(CORE + name for name in ("update", "extends", "construct"))
@@ -58,7 +65,7 @@ matters (`nodes_of`, `classes_of`, `initial_state`).
 """
 
 
-def read_schema(graph: KnowledgeGraph) -> Schema:
+def read_schema(graph: KnowledgeGraph) -> OntologySchema:
     """Return the part of an ontology that doesn't depend on individuals, read by one query."""
     parts: dict[str, list[tuple[str, str, str]]] = defaultdict(list)
     for count, (part, *row) in enumerate(graph.solutions(SCHEMA, SCENE)):
@@ -73,7 +80,7 @@ def read_schema(graph: KnowledgeGraph) -> Schema:
         if found.faults:
             raise KnowledgeError(str(found.faults[0]))
         parts["node"] += [core_triple(triple) for triple in found.triples]  # type: ignore[arg-type]
-    return Schema(
+    return OntologySchema(
         nodes=nodes_of(parts["node"]),
         supers=superclasses(sorted((sub, sup) for sub, _, sup in parts["class"])),
         owners=sorted((kind, situation) for kind, _, situation in parts["owner"]),

@@ -27,7 +27,7 @@ from confab.reasoner.symbols import (
 )
 from confab.reasoner.vocabulary import CORE, TYPE
 
-Shape: TypeAlias = "tuple[tuple[str, tuple[bool, ...]], ...]"
+LookupForm: TypeAlias = "tuple[tuple[str, tuple[bool, ...]], ...]"
 """The form of a lookup's conditions. For each condition, it has the IRI of a situation type or relation, and a flag for each
 argument: the flag tells whether the argument is the individual that is looked up.
 """
@@ -94,7 +94,7 @@ class Surroundings:
 
     def widen(self, lookups: Mapping[tuple[Witness, tuple[str, ...]], Iterable[tuple[str, ...]]]) -> bool:
         """Read the individuals that lookups find for each row of known terms; return whether a new individual was found."""
-        classes, shapes = set[str](), defaultdict[Shape, set[tuple[str, ...]]](set)
+        classes, shapes = set[str](), defaultdict[LookupForm, set[tuple[str, ...]]](set)
         for (witness, known), rows in lookups.items():
             for row in rows:
                 terms = dict(zip(known, row, strict=True))
@@ -135,7 +135,7 @@ class Surroundings:
                     continue
             yield name, tuple(None if t == variable else iri(t) for t in terms)
 
-    def _pattern(self, shape: Shape, rows: Iterable[tuple[str, ...]]) -> str:
+    def _pattern(self, shape: LookupForm, rows: Iterable[tuple[str, ...]]) -> str:
         """Return a pattern that binds ``?x`` to the individuals that a lookup finds for each row of known terms."""
         number, parts = 0, []
         at = "|".join(f"<{place}>" for place in PLACES)

@@ -9,11 +9,11 @@ from fractions import Fraction
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.names import local_name
 from confab.reasoner.reading.parts import Parts
-from confab.reasoner.reading.rows import Schema
+from confab.reasoner.reading.rows import OntologySchema
 from confab.reasoner.symbols import Problem, Symbol, Times, ValueCondition
 
 
-def with_times(problem: Problem, parts: Parts, schema: Schema) -> Problem:
+def with_times(problem: Problem, parts: Parts, schema: OntologySchema) -> Problem:
     """Return a problem with the times that its scene states; return the problem itself if the scene states no times.
 
     Raises
@@ -25,7 +25,7 @@ def with_times(problem: Problem, parts: Parts, schema: Schema) -> Problem:
     return replace(problem, times=times) if times != Times() else problem
 
 
-def deadlines(problem: Problem, parts: Parts, schema: Schema) -> dict[Symbol, Fraction]:
+def deadlines(problem: Problem, parts: Parts, schema: OntologySchema) -> dict[Symbol, Fraction]:
     """Return the deadline in seconds of each goal that has a deadline."""
     found: dict[Symbol, Fraction] = {}
     for task in schema.of_kind("Task"):
@@ -45,7 +45,9 @@ def deadlines(problem: Problem, parts: Parts, schema: Schema) -> dict[Symbol, Fr
     return found
 
 
-def windows(problem: Problem, parts: Parts, schema: Schema) -> dict[str, tuple[tuple[Fraction, Fraction | None], ...]]:
+def windows(
+    problem: Problem, parts: Parts, schema: OntologySchema
+) -> dict[str, tuple[tuple[Fraction, Fraction | None], ...]]:
     """Return the time windows, in seconds, in which individuals are available."""
     found: dict[str, list[tuple[Fraction, Fraction | None]]] = defaultdict(list)
     for iri in schema.of_kind("Window"):
@@ -59,7 +61,7 @@ def windows(problem: Problem, parts: Parts, schema: Schema) -> dict[str, tuple[t
     return {one: tuple(sorted(its, key=lambda window: window[0])) for one, its in sorted(found.items())}
 
 
-def happenings(parts: Parts, schema: Schema) -> dict[str, Fraction]:
+def happenings(parts: Parts, schema: OntologySchema) -> dict[str, Fraction]:
     """Return the time in seconds of each behaviour that happens at a fixed time."""
     found = {}
     for iri in schema.of_kind("Behavior"):

@@ -31,17 +31,17 @@ from fractions import Fraction
 from confab.reasoner.updates.conditions import Conditions
 from confab.reasoner.updates.nodes import Nodes
 from confab.reasoner.updates.numbers import Numbers, Sum
-from confab.reasoner.updates.scope import Group, Scope, last_of, middle_of, variables_in
+from confab.reasoner.updates.scope import Group, VariableScope, last_of, middle_of, variables_in
 from confab.reasoner.updates.texts import Update, Vocabulary
 from confab.reasoner.updates.words import (
     SELECT,
     A,
     Construction,
-    Number,
-    Operation,
+    NumberLiteral,
     Triple,
     Truth,
     UpdateError,
+    UpdateOperation,
     constructed,
     parsed,
 )
@@ -61,7 +61,7 @@ class UpdateCompiler:
 
     def __init__(self, behavior: str, vocabulary: Vocabulary, declared: Mapping[str, tuple[str, str, int]]) -> None:
         self.nodes = Nodes(behavior)
-        self.scope = Scope(self.nodes, vocabulary, declared)
+        self.scope = VariableScope(self.nodes, vocabulary, declared)
         self.numbers = Numbers(self.nodes, self.scope)
         self.conditions = Conditions(self.nodes, self.scope, self.numbers)
         self.known: set[str] = set()
@@ -142,12 +142,14 @@ class UpdateCompiler:
             self.scope.bind(name, self.scope.iri(kind), "Variable", "", self.nodes.now.place(kind.at))
         self.nodes.links["over"] = [self.scope.terms[name] for name in group.chosen]
         self.nodes.links["condition"] = self.conditions.all_of(group, within)
-        own = self.numbers.measured(replace(rule.head, object=(*middle_of(rule.head), Number(Fraction(0)))), within)
+        own = self.numbers.measured(
+            replace(rule.head, object=(*middle_of(rule.head), NumberLiteral(Fraction(0)))), within
+        )
         self.nodes.said[self.nodes.behavior] = {**own.properties, "aggregate": [rule.function]}
         if rule.argument is not None:
             self.numbers.side(self.nodes.behavior, "right", self.numbers.expression(rule.argument, within, at), at)
 
-    def effects(self, operation: Operation, when: Sequence[str], known: Collection[str], *asked: Group) -> None:
+    def effects(self, operation: UpdateOperation, when: Sequence[str], known: Collection[str], *asked: Group) -> None:
         """Compile the deletions and insertions of an operation into effects with the conditions `when`."""
         inserted = {(one.subject, one.predicate, middle_of(one)) for one in operation.insert}
         said = {(t.subject, t.predicate, t.object) for group in asked for t in group.parts if isinstance(t, Triple)}

@@ -9,7 +9,7 @@ import pyoxigraph as ox
 
 from confab.reasoner.names import local_name
 from confab.reasoner.updates.behaviors import UpdateCompiler
-from confab.reasoner.updates.texts import Ask, Place, Update, Vocabulary
+from confab.reasoner.updates.texts import Ask, TextPosition, Update, Vocabulary
 from confab.reasoner.updates.words import UpdateError
 from confab.reasoner.vocabulary import CORE, PREFIXES
 
@@ -32,10 +32,10 @@ PREFERRED = """SELECT ?prefix ?namespace WHERE {
 
 
 @dataclass(frozen=True)
-class Fault:
+class UpdateFault:
     """The reason why an update can't be compiled, with its position and a remedy."""
 
-    place: Place
+    place: TextPosition
     what: str
     remedy: str
 
@@ -45,15 +45,15 @@ class Fault:
 
 
 @dataclass
-class Compiled:
+class CompiledUpdates:
     """Result of the compilation of a graph's updates: the individuals' triples, the individuals' positions, and the faults."""
 
     triples: list[ox.Triple] = field(default_factory=list)
-    places: dict[str, Place] = field(default_factory=dict)
-    faults: list[Fault] = field(default_factory=list)
+    places: dict[str, TextPosition] = field(default_factory=dict)
+    faults: list[UpdateFault] = field(default_factory=list)
 
 
-def compiled(ask: Ask, spelled: Mapping[str, Mapping[str, str]], prefixes: Mapping[str, str]) -> Compiled:
+def compiled(ask: Ask, spelled: Mapping[str, Mapping[str, str]], prefixes: Mapping[str, str]) -> CompiledUpdates:
     """Compile the updates of a graph into individuals.
 
     Parameters
@@ -74,7 +74,7 @@ def compiled(ask: Ask, spelled: Mapping[str, Mapping[str, str]], prefixes: Mappi
             rules |= {behavior.value} if prop.value == CORE + "construct" else set()
         else:
             extends.setdefault(behavior.value, []).append(value.value)
-    done = Compiled()
+    done = CompiledUpdates()
     if not texts and not extends:
         return done
     vocabulary = Vocabulary.read(ask)
@@ -94,7 +94,7 @@ def compiled(ask: Ask, spelled: Mapping[str, Mapping[str, str]], prefixes: Mappi
             compiler.write_rule(updates.pop(rule))
         except UpdateError as error:
             place = replace(Update(rule, texts[rule], {}).place(error.at), form="rule")
-            done.faults.append(Fault(place, error.what, error.remedy))
+            done.faults.append(UpdateFault(place, error.what, error.remedy))
             continue
         done.triples += compiler.nodes.triples()
         done.places |= {node: replace(place, form="rule") for node, place in compiler.nodes.places.items()}
@@ -109,7 +109,7 @@ def _compile(
     extends: Mapping[str, Sequence[str]],
     declared: Mapping[str, Mapping[str, tuple[str, str, int]]],
     vocabulary: Vocabulary,
-    done: Compiled,
+    done: CompiledUpdates,
 ) -> None:
     """Compile one behaviour together with the behaviours that it extends, or record the fault."""
     sources = list(_sources(behavior, extends, ()))
@@ -117,10 +117,10 @@ def _compile(
         name = local_name(lacking[0])
         what = f"it extends {name}, which isn't written as an update"
         remedy = f"write {name} as one (confab convert --behaviors sparql), or repeat what it says"
-        done.faults.append(Fault(Place(behavior, 1, 1), what, remedy))
+        done.faults.append(UpdateFault(TextPosition(behavior, 1, 1), what, remedy))
         return
     if len(set(sources)) < len(sources):
-        done.faults.append(Fault(Place(behavior, 1, 1), "it extends itself", "take out one c:extends"))
+        done.faults.append(UpdateFault(TextPosition(behavior, 1, 1), "it extends itself", "take out one c:extends"))
         return
     terms = {name: ("", *known[1:]) for source in sources for name, known in declared.get(source, {}).items()}
     compiler = UpdateCompiler(behavior, vocabulary, {**terms, **declared.get(behavior, {})})
@@ -128,7 +128,7 @@ def _compile(
         try:
             compiler.write(update)
         except UpdateError as error:
-            done.faults.append(Fault(update.place(error.at), error.what, error.remedy))
+            done.faults.append(UpdateFault(update.place(error.at), error.what, error.remedy))
             return
     done.triples += compiler.nodes.triples()
     done.places |= compiler.nodes.places

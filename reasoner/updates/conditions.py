@@ -16,7 +16,7 @@ from confab.reasoner.condition_nodes import (
 from confab.reasoner.names import local_name, nearest
 from confab.reasoner.updates.nodes import Nodes
 from confab.reasoner.updates.numbers import Numbers, unwrapped
-from confab.reasoner.updates.scope import Group, Scope, last_of, mentioned, variables_in
+from confab.reasoner.updates.scope import Group, VariableScope, last_of, mentioned, variables_in
 from confab.reasoner.updates.words import A, Triple, Truth, UpdateError, Word, parts, place, term
 from confab.reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, TYPE
 
@@ -30,7 +30,7 @@ class Conditions:
     """Compiler of the conditions of one behaviour or rule."""
 
     nodes: Nodes
-    scope: Scope
+    scope: VariableScope
     numbers: Numbers
 
     def sought(self, group: Group, known: Collection[str], at: int) -> list[str]:

@@ -18,7 +18,7 @@ import pyoxigraph as ox
 from confab.reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, load, readable, scene_file, text
 from confab.reasoner.names import local_name
 from confab.reasoner.reading.frame import as_written
-from confab.reasoner.reading.rows import Schema
+from confab.reasoner.reading.rows import OntologySchema
 from confab.reasoner.reading.schema import read_schema
 from confab.reasoner.symbols import AnyOf, Behavior, Condition, Span, Witness, substituted
 from confab.reasoner.updates.compiling import compiled
@@ -120,7 +120,7 @@ def convert(path: Path, form: Form) -> Converted:
     return _to_updates(file, graph, schema, own) if form == "sparql" else _to_individuals(file, graph, own)
 
 
-def update_of(graph: KnowledgeGraph, schema: Schema, iri: str) -> str:
+def update_of(graph: KnowledgeGraph, schema: OntologySchema, iri: str) -> str:
     """Return a behaviour as a SPARQL update with the PREFIX declarations for its names.
 
     Raises
@@ -163,7 +163,7 @@ def _file(path: Path) -> _File:
     return file
 
 
-def _to_updates(file: _File, graph: KnowledgeGraph, schema: Schema, own: Sequence[str]) -> Converted:
+def _to_updates(file: _File, graph: KnowledgeGraph, schema: OntologySchema, own: Sequence[str]) -> Converted:
     situations = situations_of(schema)
     done, notes, kept = [], [], set[str]()
     gone: set[str] = set()
@@ -257,7 +257,7 @@ def _joined(file: _File) -> str:
     return re.sub(r"\n{3,}", "\n\n", "".join(statement.text for statement in file.statements)).rstrip() + "\n"
 
 
-def _parts(iri: str, schema: Schema) -> set[str]:
+def _parts(iri: str, schema: OntologySchema) -> set[str]:
     """Return the terms, conditions and effects of a behaviour."""
     found: set[str] = set()
     waiting = [part for name in LINKS for part in schema.nodes[iri].get(name, ())]
@@ -270,18 +270,18 @@ def _parts(iri: str, schema: Schema) -> set[str]:
     return found
 
 
-def _is_term(iri: str, schema: Schema) -> bool:
+def _is_term(iri: str, schema: OntologySchema) -> bool:
     return bool({CORE + "Parameter", CORE + "Variable"} & set(schema.nodes[iri][TYPE]))
 
 
-def _is_said(iri: str, schema: Schema) -> bool:
+def _is_said(iri: str, schema: OntologySchema) -> bool:
     return any(
         kind.startswith(CORE) and kind.endswith(("Condition", "Effect", "Of", "Witness", "Comparison", "Calculation"))
         for kind in schema.nodes[iri][TYPE]
     )
 
 
-def _why_not(iri: str, parts: Iterable[str], file: _File, schema: Schema) -> str:
+def _why_not(iri: str, parts: Iterable[str], file: _File, schema: OntologySchema) -> str:
     """Return the reason why the statements of a behaviour's parts can't be replaced; an empty text if replacement is possible."""
     for part in sorted(parts):
         if part not in file.said:
@@ -346,7 +346,7 @@ def compiled_again(graph: KnowledgeGraph, iri: str, written: str, prefixes: Mapp
     return as_written(replace(schema, nodes={**others, **nodes}), [iri])[iri]
 
 
-def situations_of(schema: Schema) -> Situations:
+def situations_of(schema: OntologySchema) -> Situations:
     """Return the value properties and the many-valued situation types of a schema."""
     properties = {
         iri: prop

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import pyoxigraph as ox
 
 from confab.reasoner.condition_nodes import Properties, triples
-from confab.reasoner.updates.texts import Place, Update
+from confab.reasoner.updates.texts import TextPosition, Update
 from confab.reasoner.vocabulary import CORE, INDIVIDUAL, TYPE
 
 
@@ -21,7 +21,7 @@ class Nodes:
     behavior : str
     said : mapping of node to properties
         The properties of each node, as a mapping of the core property's name to values; the key `TYPE` has the node's classes.
-    places : mapping of node to Place
+    places : mapping of node to TextPosition
     links : Properties
         The properties of the behaviour itself.
     count : mapping of name to int
@@ -32,7 +32,7 @@ class Nodes:
 
     behavior: str
     said: dict[str, Properties] = field(default_factory=dict)
-    places: dict[str, Place] = field(default_factory=dict)
+    places: dict[str, TextPosition] = field(default_factory=dict)
     links: Properties = field(default_factory=lambda: {"parameter": [], "precondition": [], "postcondition": []})
     count: dict[str, int] = field(default_factory=dict)
     now: Update = field(default_factory=lambda: Update("", "", {}))

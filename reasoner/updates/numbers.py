@@ -11,14 +11,14 @@ from typing import Any, TypeAlias
 from confab.reasoner.amounts import written
 from confab.reasoner.condition_nodes import Properties, argument_properties
 from confab.reasoner.updates.nodes import Nodes
-from confab.reasoner.updates.scope import Scope, middle_of
-from confab.reasoner.updates.words import Number, Said, Triple, UpdateError, Word, term
+from confab.reasoner.updates.scope import VariableScope, middle_of
+from confab.reasoner.updates.words import NumberLiteral, Said, Triple, UpdateError, Word, term
 
 ARITHMETIC = ("AdditiveExpression", "MultiplicativeExpression", "UnaryMinus")
 
 
 @dataclass(frozen=True)
-class Measured:
+class NumberPattern:
     """An amount with its arguments, or a static relation that assigns a number to its arguments."""
 
     kind: str
@@ -40,7 +40,7 @@ class Sum:
     right: Side
 
 
-Side: TypeAlias = "Measured | Sum | Number"
+Side: TypeAlias = "NumberPattern | Sum | NumberLiteral"
 
 
 @dataclass(frozen=True)
@@ -48,19 +48,19 @@ class Numbers:
     """Compiler of the numeric expressions of one behaviour or rule."""
 
     nodes: Nodes
-    scope: Scope
+    scope: VariableScope
 
     def is_number(self, tree: Any) -> bool:
         """Return whether an expression denotes a number."""
         one = unwrapped(tree)
         if isinstance(one, Word):
             return one in self.scope.numbers
-        return getattr(one, "name", "") in ARITHMETIC or isinstance(_term_or_none(one), Number)
+        return getattr(one, "name", "") in ARITHMETIC or isinstance(_term_or_none(one), NumberLiteral)
 
     def expression(self, tree: Any, known: Collection[str], at: int) -> Side:
         """Return the compiled form of a numeric expression, with amounts substituted for the variables that denote amounts."""
         one = unwrapped(tree)
-        if isinstance(one, Number):
+        if isinstance(one, NumberLiteral):
             return one
         if isinstance(one, Word) and one in self.scope.numbers and one in known:
             said = self.scope.numbers[one]
@@ -68,24 +68,28 @@ class Numbers:
         name = getattr(one, "name", "")
         if name == "UnaryMinus":
             found = self.expression(one.expr, known, at)
-            return Number(-found.value) if isinstance(found, Number) else Sum("-", Number(Fraction(0)), found)
+            return (
+                NumberLiteral(-found.value)
+                if isinstance(found, NumberLiteral)
+                else Sum("-", NumberLiteral(Fraction(0)), found)
+            )
         if name in ARITHMETIC:
             found = self.expression(one.expr, known, at)
             for sign, other in zip(one.op, one.other, strict=True):
                 found = Sum(str(sign), found, self.expression(other, known, at))
             return found
         number = _term_or_none(one)
-        if isinstance(number, Number):
+        if isinstance(number, NumberLiteral):
             return number
         what = f"{one} is no number" if isinstance(one, Word) else "this is no number"
         raise UpdateError(what, "compare and calculate with numbers, and with variables that amounts give one", at)
 
-    def measured(self, one: Triple, known: Collection[str]) -> Measured:
+    def measured(self, one: Triple, known: Collection[str]) -> NumberPattern:
         """Return the amount or relation that a triple names, with the arguments: the triple's subject, and possibly others."""
         prop, at = self.scope.iri(one.predicate), one.predicate.at
         terms = [self.scope.put(each, known, at) for each in (one.subject, *middle_of(one))]
         kind = "relation" if prop in self.scope.vocabulary.measures else "situationType"
-        return Measured(kind, self.scope.vocabulary.properties.get(prop, prop), tuple(terms))
+        return NumberPattern(kind, self.scope.vocabulary.properties.get(prop, prop), tuple(terms))
 
     def comparison(self, left: Side, sign: str, right: Side, negated: bool, at: int) -> str:
         """Return the node of a comparison of two numeric expressions."""
@@ -99,18 +103,18 @@ class Numbers:
 
         An amount on the left and a number on the right become properties of the node; other operands become separate nodes.
         """
-        if name == "left" and isinstance(side, Measured):
+        if name == "left" and isinstance(side, NumberPattern):
             self.nodes.said[node] |= side.properties
             return
-        if name == "right" and isinstance(side, Number):
+        if name == "right" and isinstance(side, NumberLiteral):
             self.nodes.said[node]["amount"] = [written(side.value)]
             return
         inner = self.nodes.new("amount", "Calculation", at)
         self.nodes.said[node][name] = [inner]
         match side:
-            case Measured():
+            case NumberPattern():
                 self.nodes.said[inner] |= side.properties
-            case Number(value):
+            case NumberLiteral(value):
                 self.nodes.said[inner]["amount"] = [written(value)]
             case Sum(sign, left, right):
                 self.nodes.said[inner]["sign"] = [sign]

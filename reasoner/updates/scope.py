@@ -12,8 +12,19 @@ from typing import Any
 from confab.reasoner.amounts import written
 from confab.reasoner.names import nearest
 from confab.reasoner.updates.nodes import Nodes
-from confab.reasoner.updates.texts import Place, Vocabulary
-from confab.reasoner.updates.words import A, Number, Said, Triple, Truth, UpdateError, Word, parts, triples, words
+from confab.reasoner.updates.texts import TextPosition, Vocabulary
+from confab.reasoner.updates.words import (
+    A,
+    NumberLiteral,
+    Said,
+    Triple,
+    Truth,
+    UpdateError,
+    Word,
+    parts,
+    triples,
+    words,
+)
 from confab.reasoner.vocabulary import CORE, INDIVIDUAL, TYPE
 
 
@@ -38,7 +49,7 @@ class Group:
 
 
 @dataclass
-class Scope:
+class VariableScope:
     """The variables of a behaviour or rule.
 
     Attributes
@@ -62,7 +73,7 @@ class Scope:
     prefixes: dict[str, str] = field(default_factory=dict)
     numbers: dict[str, Any] = field(default_factory=dict)
 
-    def bind(self, name: str, kind: str, role: str, node: str, place: Place, sought: bool = False) -> None:
+    def bind(self, name: str, kind: str, role: str, node: str, place: TextPosition, sought: bool = False) -> None:
         """Map a variable to a term node. Two different variables with the same name get different nodes."""
         found = self.declared.get(name, ("", "", 0))
         if not node and found[0]:
@@ -105,7 +116,7 @@ class Scope:
         """Return the node of a variable, or the IRI of an individual or truth value."""
         if isinstance(said, Truth):
             return CORE + ("true" if said.value else "false")
-        if isinstance(said, Number):
+        if isinstance(said, NumberLiteral):
             raise UpdateError(
                 f"the number {written(said.value)} is in the place of an individual",
                 "name an individual, or use a variable",

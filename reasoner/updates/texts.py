@@ -22,7 +22,7 @@ VOCABULARY = """SELECT DISTINCT ?kind ?term ?other WHERE {
 
 
 @dataclass(frozen=True)
-class Place:
+class TextPosition:
     """A position in a behaviour's update or a rule's query; lines and columns are counted from 1."""
 
     behavior: str
@@ -48,10 +48,10 @@ class Update:
     text: str
     prefixes: Mapping[str, str]
 
-    def place(self, at: int) -> Place:
+    def place(self, at: int) -> TextPosition:
         """Return the line and column of the character at an index of the text."""
         before = self.text[:at]
-        return Place(self.behavior, before.count("\n") + 1, at - (before.rfind("\n") + 1) + 1)
+        return TextPosition(self.behavior, before.count("\n") + 1, at - (before.rfind("\n") + 1) + 1)
 
 
 @dataclass(frozen=True)

@@ -44,14 +44,14 @@ class Truth:
 
 
 @dataclass(frozen=True)
-class Number:
+class NumberLiteral:
     """An exact number."""
 
     value: Fraction
 
 
-Said = Word | Truth | Number
-Value = Word | Truth | Number | tuple[Said, ...]
+Said = Word | Truth | NumberLiteral
+Value = Word | Truth | NumberLiteral | tuple[Said, ...]
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Triple:
 
 
 @dataclass(frozen=True)
-class Operation:
+class UpdateOperation:
     """The operation ``DELETE { … } INSERT { … } WHERE { … }``; `where` contains the parts of the WHERE group."""
 
     delete: Sequence[Triple]
@@ -100,7 +100,7 @@ class UpdateError(ValueError):
 
 
 @silent_about_numbers()
-def parsed(text: str) -> tuple[Mapping[str, str], list[Operation]]:
+def parsed(text: str) -> tuple[Mapping[str, str], list[UpdateOperation]]:
     """Return the prefixes that an update declares, and its operations in order.
 
     >>> prefixes, (operation,) = parsed("PREFIX : <urn:x#> DELETE { ?a :p ?b } INSERT { ?a :p :c } WHERE { ?a :p ?b }")
@@ -268,13 +268,13 @@ def _skipped(text: str, at: int) -> int:
     return len(text) - len(text[at:].lstrip())
 
 
-def _operation(request: Any, text: str) -> Operation:
+def _operation(request: Any, text: str) -> UpdateOperation:
     if request.name == "DeleteWhere":
         delete = _quads(request.quads)
-        return Operation(delete, (), [_Block(delete)], _least(delete, 0))
+        return UpdateOperation(delete, (), [_DeletePattern(delete)], _least(delete, 0))
     if request.name == "InsertData":
         insert = _quads(request.quads)
-        return Operation((), insert, (), _least(insert, 0))
+        return UpdateOperation((), insert, (), _least(insert, 0))
     if request.name != "Modify" or request.withClause or request.using:
         raise UpdateError(
             "a behaviour deletes and inserts in the situation that it is done in",
@@ -283,11 +283,11 @@ def _operation(request: Any, text: str) -> Operation:
         )
     delete = _quads(request.delete.quads) if request.delete else []
     insert = _quads(request.insert.quads) if request.insert else []
-    return Operation(delete, insert, parts(request.where), _least([*delete, *insert], 0))
+    return UpdateOperation(delete, insert, parts(request.where), _least([*delete, *insert], 0))
 
 
 @dataclass(frozen=True)
-class _Block:
+class _DeletePattern:
     """The triples of a DELETE WHERE operation, in the form of a part of a group."""
 
     triples: Sequence[Triple]
@@ -355,7 +355,7 @@ def term(value: Any, at: int) -> Said:
     if isinstance(said, bool):
         return Truth(said)
     if isinstance(said, int | float | Decimal):
-        return Number(Fraction(str(value)))
+        return NumberLiteral(Fraction(str(value)))
     text = value if type(value).__name__ == "Literal" else getattr(value, "string", None)
     if text is None:
         raise UpdateError(

@@ -62,7 +62,7 @@ def update(behavior: Behavior, situations: Situations, spell: Spell, labels: Seq
     labels : sequence of str
         Labels of the preconditions in their order; they become comments.
     """
-    writer = _Writer(behavior, situations, spell)
+    writer = _UpdateWriter(behavior, situations, spell)
     behavior = _by_their_class(behavior)
     (_, effects), *conditional = _operations(behavior)
     operations = [writer.main(effects, labels), *(writer.conditional(when, made) for when, made in conditional)]
@@ -101,7 +101,7 @@ def _operations(behavior: Behavior) -> list[tuple[tuple[Condition, ...], list[Va
 
 
 @dataclass
-class _Writer:
+class _UpdateWriter:
     behavior: Behavior
     situations: Situations
     spell: Spell

@@ -7,11 +7,11 @@ from collections.abc import Iterator, Mapping, Sequence, Set
 
 import pyoxigraph as ox
 
-from confab.reasoner.condition_nodes import Node
+from confab.reasoner.condition_nodes import NodeValues
 from confab.reasoner.derivation import needed
 from confab.reasoner.names import local_name
 from confab.reasoner.reading.definitions import Definitions
-from confab.reasoner.reading.rows import Schema
+from confab.reasoner.reading.rows import OntologySchema
 from confab.reasoner.symbols import (
     ClassCondition,
     Domain,
@@ -86,7 +86,7 @@ def definitions_without_effect(case: Case) -> Iterator[Fault]:
             )
 
 
-def _unevaluated(schema: Schema, situation: str, prop: str, changed: Set[str], said: str) -> Fault | None:
+def _unevaluated(schema: OntologySchema, situation: str, prop: str, changed: Set[str], said: str) -> Fault | None:
     """Return the reason why planning ignores an axiom about a value property, or None if another check reports the reason."""
     name, what = local_name(prop), f"planning doesn't evaluate that {said}, since "
     nodes = {**schema.axioms, **schema.expressions}
@@ -286,7 +286,7 @@ def _above(case: Case, iri: str) -> set[str]:
     return found
 
 
-def _items(expressions: Mapping[str, Node], node: str) -> Iterator[str]:
+def _items(expressions: Mapping[str, NodeValues], node: str) -> Iterator[str]:
     """Yield the conjuncts of an intersection."""
     cells, seen = list(expressions.get(node, {}).get(OWL + "intersectionOf", ())), set[str]()
     while cells:

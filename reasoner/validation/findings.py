@@ -15,7 +15,7 @@ import pyoxigraph as ox
 from confab.reasoner.graph.knowledge import KnowledgeGraph, readable
 from confab.reasoner.limits import check
 from confab.reasoner.names import local_name
-from confab.reasoner.updates.texts import Place
+from confab.reasoner.updates.texts import TextPosition
 from confab.reasoner.vocabulary import CORE, RDFS
 
 ERROR, WARNING, REMARK = "error", "warning", "remark"
@@ -102,7 +102,7 @@ class Places:
 
     def __init__(self, graph: KnowledgeGraph) -> None:
         self.graph = graph
-        self._lines: dict[Path, _Lines] = {}
+        self._lines: dict[Path, _LineIndex] = {}
 
     def finding(self, rule: str, node: str, what: str, why: str, remedy: str, severity: str = ERROR) -> Finding:
         """Return a finding on a node; for a node that was compiled from an update, the position is in the update."""
@@ -114,7 +114,9 @@ class Places:
             str(file or ""), self._line(file, node), node, self.label(node), rule, what, why, remedy, severity
         )
 
-    def in_update(self, rule: str, place: Place, what: str, why: str, remedy: str, severity: str = ERROR) -> Finding:
+    def in_update(
+        self, rule: str, place: TextPosition, what: str, why: str, remedy: str, severity: str = ERROR
+    ) -> Finding:
         """Return a finding on a part of an update, with the behaviour as the node, and the line of the part."""
         node = place.behavior
         file = self._files.get(node) or self.graph.path
@@ -153,7 +155,7 @@ class Places:
         if file is None:
             return 0
         if file not in self._lines:
-            self._lines[file] = _Lines(file)
+            self._lines[file] = _LineIndex(file)
         return self._lines[file].of(node)
 
     @cached_property
@@ -200,7 +202,7 @@ def relative(node: str, file: Path) -> str:
     return node.removeprefix(own) if node.startswith(own) else node.removeprefix(f"{own.rpartition('/')[0]}/")
 
 
-class _Lines:
+class _LineIndex:
     """The lines of a Turtle file: the first line that begins with a word, and the first line that mentions a name."""
 
     def __init__(self, file: Path) -> None:

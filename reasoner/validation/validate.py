@@ -37,7 +37,7 @@ from confab.reasoner.memory.experience_file import parse
 from confab.reasoner.memory.links_file import memory_lines
 from confab.reasoner.names import local_name
 from confab.reasoner.reading.problem import Reading, read
-from confab.reasoner.updates.compiling import Fault
+from confab.reasoner.updates.compiling import UpdateFault
 from confab.reasoner.validation.case import Case
 from confab.reasoner.validation.contradictions import impossible_situations
 from confab.reasoner.validation.findings import ERROR, REMARK, WARNING, Finding, Places, fill, unique
@@ -155,7 +155,7 @@ def _by_rules(case: Case, places: Places, found: Sequence[Finding]) -> Iterator[
 def _validate_one(file: str | Path, deep: bool, done: Callable[[str], object]) -> Iterator[Finding]:
     path = scene_file(file)
     done(f"reading {path.name}")
-    faults: list[Fault] = []
+    faults: list[UpdateFault] = []
     try:
         graph = load(path, faults=faults)
     except KnowledgeError as error:
@@ -280,7 +280,7 @@ def _unreadable(graph: KnowledgeGraph, places: Places, problem: KnowledgeError) 
 
 
 @dataclass(frozen=True)
-class Check:
+class EmptyQuery:
     """A query whose result must be empty, and templates of the sentences that describe a row of the result."""
 
     rule: str
@@ -292,14 +292,14 @@ class Check:
 
 
 @cache
-def checks(folder: Path = ontology.ROOT / "checks") -> tuple[Check, ...]:
+def checks(folder: Path = ontology.ROOT / "checks") -> tuple[EmptyQuery, ...]:
     """Return the checks in a folder; ``# What:``, ``# Why:``, ``# Do:`` and optionally ``# Severity:`` begin each file."""
     found = []
     for path in sorted(folder.glob("*.rq")):
         text = path.read_text(encoding="utf-8")
         head = dict(line[2:].split(": ", 1) for line in text.splitlines() if line.startswith("# ") and ": " in line)
         severity = head.get("Severity", ERROR)
-        found.append(Check(path.stem, head["What"], head["Why"], head["Do"], severity, text))
+        found.append(EmptyQuery(path.stem, head["What"], head["Why"], head["Do"], severity, text))
     return tuple(found)
 
 

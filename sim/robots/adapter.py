@@ -16,12 +16,12 @@ from threading import Condition, Thread
 from time import monotonic
 from typing import Any, TypeVar
 
-from confab.planner.acting.world import INTERRUPTED, Report
+from confab.planner.acting.world import INTERRUPTED, WorldReport
 from confab.planner.plan import Step
 from confab.reasoner.amounts import written
-from confab.reasoner.embodiment.interfaces import Interface, InterfaceCall, Reading
+from confab.reasoner.embodiment.interfaces import Interface, InterfaceCall, ReadField
 from confab.reasoner.symbols import FALSE, TRUE, Fact, Problem, State, Symbol
-from confab.sim.robots.transport import Model, RobotError, Transport
+from confab.sim.robots.transport import RobotError, Transport, WorldModel
 
 GRACE = 5.0
 """Maximum time in seconds in which a robot must end a cancelled action."""
@@ -77,7 +77,7 @@ class InterfaceWorld:
         model = self._model()
         return {symbol: value for reading in self.interface.readings for symbol, value in self._read(reading, model)}
 
-    def _model(self) -> Model:
+    def _model(self) -> WorldModel:
         for attempt in range(LOOKS):
             try:
                 model = self.transport.model()
@@ -89,7 +89,7 @@ class InterfaceWorld:
             raise RobotError(f"the world model of {self.interface.name} is {model!r:.60}; wanted fields by entity")
         return model
 
-    def _read(self, reading: Reading, model: Model) -> Iterator[tuple[Symbol, str]]:
+    def _read(self, reading: ReadField, model: WorldModel) -> Iterator[tuple[Symbol, str]]:
         """Yield the symbols of a situation type with the values that the world model shows."""
         kind = self.problem.domain.situations.get(reading.situation)
         if kind is None:
@@ -121,13 +121,13 @@ class InterfaceWorld:
 
     # --------------------------------------------------------------------------------------------------- action
 
-    def execute(self, step: Step) -> Report:
+    def execute(self, step: Step) -> WorldReport:
         """Execute a primitive: call its action, and wait until the answer, the time limit, or `stop`."""
         call = self.interface.calls.get(step.behavior)
         if call is None:
-            return Report(False, "no action", (), f"{self.interface.name} has no action for {step.behavior}")
+            return WorldReport(False, "no action", (), f"{self.interface.name} has no action for {step.behavior}")
         if not self._idle():
-            return Report(False, "busy", step.arguments, "the robot still executes an action that was cancelled")
+            return WorldReport(False, "busy", step.arguments, "the robot still executes an action that was cancelled")
         arguments = {
             name: self.robot_name.get(step.arguments[given], step.arguments[given]) if isinstance(given, int) else given
             for name, given in call.arguments.items()
@@ -139,7 +139,7 @@ class InterfaceWorld:
             return self._cancelled(step, call)
         answer = answers[0]
         if isinstance(answer, Exception):
-            return Report(False, "no answer", step.arguments, str(answer))
+            return WorldReport(False, "no answer", step.arguments, str(answer))
         return self._meaning(step, call, *answer)
 
     def stop(self) -> None:
@@ -185,7 +185,7 @@ class InterfaceWorld:
         with self.changed:
             return self.changed.wait_for(lambda: self.running is None, GRACE)
 
-    def _cancelled(self, step: Step, call: InterfaceCall) -> Report:
+    def _cancelled(self, step: Step, call: InterfaceCall) -> WorldReport:
         """Cancel the running action, and return a report with the reason."""
         stopped = self.stopping
         self._begin_cancelling()
@@ -195,9 +195,9 @@ class InterfaceWorld:
             else f"{call.action} didn't end within {GRACE:g} s of being cancelled; the robot may still move"
         )
         if stopped:
-            return Report(False, NOT_STOPPED if said else INTERRUPTED, step.arguments, said or "it was stopped")
+            return WorldReport(False, NOT_STOPPED if said else INTERRUPTED, step.arguments, said or "it was stopped")
         late = f"{call.action} took longer than {call.seconds:g} s"
-        return Report(False, "timed out", step.arguments, "; ".join(filter(None, (late, said))))
+        return WorldReport(False, "timed out", step.arguments, "; ".join(filter(None, (late, said))))
 
     def _begin_cancelling(self) -> Thread:
         """Start a thread that requests the robot to end its action and ignores errors; return the thread."""
@@ -210,14 +210,14 @@ class InterfaceWorld:
         cancelling.start()
         return cancelling
 
-    def _meaning(self, step: Step, call: InterfaceCall, status: str, message: str) -> Report:
+    def _meaning(self, step: Step, call: InterfaceCall, status: str, message: str) -> WorldReport:
         meaning = self.interface.meanings.get(status)
         if meaning is None:
             known = ", ".join(self.interface.meanings)
             text = f"{call.action} was answered with the status '{status}', which {self.interface.name} doesn't have ({known})"
-            return Report(False, "unknown answer", step.arguments, text)
+            return WorldReport(False, "unknown answer", step.arguments, text)
         if meaning.success:
-            return Report(True)
+            return WorldReport(True)
         facts: tuple[Fact, ...] = ()
         if meaning.refuted_while:
             facts = tuple(
@@ -225,7 +225,7 @@ class InterfaceWorld:
                 for symbol, value in self.observe().items()
                 if symbol.situation in meaning.refuted_while and symbol.arguments[0] in step.arguments
             )
-        return Report(False, meaning.code, step.arguments, message or f"{call.action}: {status}", facts)
+        return WorldReport(False, meaning.code, step.arguments, message or f"{call.action}: {status}", facts)
 
 
 def _amount(shown: Any, step: str | None) -> str | None:

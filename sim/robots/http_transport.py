@@ -20,7 +20,7 @@ from urllib.error import URLError
 from urllib.parse import urlsplit
 from urllib.request import Request, urlopen
 
-from confab.sim.robots.transport import Model, RobotError
+from confab.sim.robots.transport import RobotError, WorldModel
 
 ANSWERS_WITHIN = 5.0
 """Maximum time in seconds until a server answers a request for its world model or a cancellation."""
@@ -64,7 +64,7 @@ class HttpRobot:
         """Request the server to end the running action."""
         self._asked("/cancel", {}, ANSWERS_WITHIN)
 
-    def model(self) -> Model:
+    def model(self) -> WorldModel:
         """Return the world model."""
         said = self._asked("/model", None, ANSWERS_WITHIN)
         if not isinstance(said, Mapping):

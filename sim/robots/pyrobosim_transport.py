@@ -12,7 +12,7 @@ from typing import Any
 import networkx
 import numpy as np
 
-from confab.sim.robots.transport import Model, RobotError
+from confab.sim.robots.transport import RobotError, WorldModel
 
 AS_FAST_AS_POSSIBLE = -1.0
 """pyrobosim's real-time factor for a simulation without waiting."""
@@ -105,7 +105,7 @@ class Pyrobosim:
         if robot is not None:
             robot.cancel_actions()
 
-    def model(self) -> Model:
+    def model(self) -> WorldModel:
         """Return rooms, hallways, locations with their spawns, objects known to the robots, robots, and paths."""
         world = self.world
         known = {thing.name for robot in world.robots for thing in robot.get_known_objects()}
@@ -158,7 +158,7 @@ class Pyrobosim:
             here = getattr(here, "parent", None)
         return None if here is None else str(here.name)
 
-    def scene_model(self) -> Model:
+    def scene_model(self) -> WorldModel:
         """Return the world model with shapes, and with the longest path in metres between places of any two rooms."""
         shapes = self._shapes()
         shaped = {name: {**fields, "shape": shapes.get(name, [])} for name, fields in self.model().items()}

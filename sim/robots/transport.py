@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Protocol, TypeAlias
 
-Model: TypeAlias = "Mapping[str, Mapping[str, Any]]"
+WorldModel: TypeAlias = "Mapping[str, Mapping[str, Any]]"
 """A robot's world model: the fields of each entity, with a text, number, truth value, list of texts, or None."""
 
 
@@ -22,5 +22,5 @@ class Transport(Protocol):
     def cancel(self) -> None:
         """End the running action, so that `call` returns; raise `RobotError` if that is impossible."""
 
-    def model(self) -> Model:
+    def model(self) -> WorldModel:
         """Return the present world model; raise `RobotError` if the world model is unavailable."""

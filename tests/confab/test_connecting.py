@@ -18,7 +18,7 @@ from confab.connecting import connected
 from confab.execution import Execution, execute
 from confab.planner.acting.asynchronous import Synchronous
 from confab.planner.acting.symbolic_world import SymbolicWorld
-from confab.planner.acting.world import INTERRUPTED, Report
+from confab.planner.acting.world import INTERRUPTED, WorldReport
 from confab.planner.plan import Step
 from confab.reasoner.embodiment.interfaces import read_interface
 from confab.reasoner.graph.knowledge import KnowledgeError
@@ -257,13 +257,13 @@ class Slow:
     async def observe(self) -> State:
         return self.inner.observe()
 
-    async def execute(self, step: Step) -> Report:
+    async def execute(self, step: Step) -> WorldReport:
         self.ended.clear()
         try:
             await asyncio.wait_for(self.ended.wait(), self.pause)
         except asyncio.TimeoutError:
             return self.inner.execute(step)
-        return Report(False, INTERRUPTED, step.arguments, "it was stopped")
+        return WorldReport(False, INTERRUPTED, step.arguments, "it was stopped")
 
     async def stop(self) -> None:
         self.ended.set()
@@ -338,8 +338,8 @@ def test_a_world_that_stays_stopped_or_always_fails_a_step_fails_the_conformance
     class Stopped(SymbolicWorld):
         still = False
 
-        def execute(self, step: Step) -> Report:
-            return Report(False, "interrupted") if self.still else super().execute(step)
+        def execute(self, step: Step) -> WorldReport:
+            return WorldReport(False, "interrupted") if self.still else super().execute(step)
 
         def stop(self) -> None:
             self.still = True
@@ -347,9 +347,9 @@ def test_a_world_that_stays_stopped_or_always_fails_a_step_fails_the_conformance
     assert check_world(Stopped(problem), problem)["cancellation"].passed is False
 
     class Clumsy(SymbolicWorld):
-        def execute(self, step: Step) -> Report:
+        def execute(self, step: Step) -> WorldReport:
             if step.behavior == "B3_GRASP":
-                return Report(False, "slipped", step.arguments)
+                return WorldReport(False, "slipped", step.arguments)
             return super().execute(step)
 
     found = check_world(Clumsy(problem), problem)
@@ -370,7 +370,7 @@ def test_a_world_that_does_not_stop_or_whose_clock_runs_backwards_fails_the_conf
     problem = confab.load("beverage-serving").problem
 
     class Stubborn(SymbolicWorld):
-        def execute(self, step: Step) -> Report:
+        def execute(self, step: Step) -> WorldReport:
             time.sleep(0.4)
             return super().execute(step)
 

@@ -21,7 +21,7 @@ from confab.reasoner.generate import write_scene
 from confab.reasoner.graph.knowledge import BASE, SCENE, Answer, KnowledgeGraph, load, text
 from confab.reasoner.names import local_name
 from confab.reasoner.reading.relevance import recognise
-from confab.reasoner.reading.rows import Member, Schema
+from confab.reasoner.reading.rows import Member, OntologySchema
 from confab.reasoner.reading.schema import SCHEMA
 
 
@@ -136,7 +136,7 @@ def test_recognition_reads_no_irrelevant_objects(tmp_path: Path, goals: tuple[st
 def test_a_query_for_all_individuals_with_a_name_is_detected(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Commit 40b5436 had this fault: a query for individuals with the same name read all individuals."""
 
-    def namesakes(graph: KnowledgeGraph, schema: Schema, members: Sequence[Member]) -> set[str]:
+    def namesakes(graph: KnowledgeGraph, schema: OntologySchema, members: Sequence[Member]) -> set[str]:
         endings = {local_name(individual) for individual, _, _ in members}
         found = {text(x) for (x,) in graph.select("SELECT ?x WHERE { ?x a owl:NamedIndividual }", SCENE)}
         return {x for x in found if local_name(x) in endings} - {individual for individual, _, _ in members}

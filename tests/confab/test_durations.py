@@ -15,7 +15,7 @@ from confab.cli import app
 from confab.execution import Execution
 from confab.memory import Memory
 from confab.planner.acting.symbolic_world import SymbolicWorld
-from confab.planner.acting.world import Report
+from confab.planner.acting.world import WorldReport
 from confab.planner.plan import Step
 from confab.planning import Result
 from confab.reasoner.graph.knowledge import KnowledgeError
@@ -33,7 +33,7 @@ class Robot(SymbolicWorld):
         super().__init__(problem)
         self.rng, self.slower = Random(seed), slower
 
-    def execute(self, step: Step) -> Report:
+    def execute(self, step: Step) -> WorldReport:
         slower = next(self.slower[one] for one in step.arguments if one in self.slower)
         true = Random(step.behavior).uniform(1, 4) * slower
         self._seconds_of[step.behavior] = true * self.rng.uniform(0.8, 1.2)

@@ -11,7 +11,7 @@ import confab
 from confab import cli
 from confab.authoring import new_domain
 from confab.commands.planning import plan
-from confab.plan_options import Options, PlanOptions
+from confab.plan_options import PlanKeywords, PlanOptions
 from confab.planner.plan import Outcome, Plan, Status
 from confab.planner.solve import MODES, Mode
 from confab.reasoner.generate import write_scene
@@ -52,7 +52,7 @@ def test_options_that_exclude_each_other_are_refused(scene: confab.Scene) -> Non
 
 def test_python_the_command_line_and_agents_have_the_same_options_of_a_planning_call() -> None:
     options = [field.name for field in fields(PlanOptions)]
-    assert [*Options.__annotations__] == options
+    assert [*PlanKeywords.__annotations__] == options
     assert [
         name for name in signature(confab.Scene.plan).parameters if name not in ("scene", "goals", "goal")
     ] == options

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 import confab
 from confab.cli import app
 from confab.planner.acting.symbolic_world import SymbolicWorld
-from confab.planner.acting.world import Report
+from confab.planner.acting.world import WorldReport
 from confab.planner.behavior_tree import Situation
 from confab.planner.plan import Plan, Step
 from confab.planner.validation import open_goals
@@ -98,7 +98,7 @@ class Undone(SymbolicWorld):
         super().__init__(problem)
         self.left, self.draw, self.undone = after, draw, ""
 
-    def execute(self, step: Step) -> Report:
+    def execute(self, step: Step) -> WorldReport:
         said = super().execute(step)
         self.left -= 1
         free = all(

@@ -58,16 +58,16 @@ class Forgetful:
 
     def __init__(self, patch: pytest.MonkeyPatch) -> None:
         self.lost: int | None = None
-        close = relevance._Search.close
+        close = relevance._RouteSearch.close
 
         def closed(
-            search: relevance._Search, fresh: list[Triple], constants: set[str], bounds: relevance.Routes
+            search: relevance._RouteSearch, fresh: list[Triple], constants: set[str], bounds: relevance.Routes
         ) -> None:
             close(search, fresh, constants, bounds)
             if self.lost is not None and (found := sorted(search.seen - {s for s, _, _ in fresh})):
                 search.seen.remove(found[self.lost % len(found)])
 
-        patch.setattr(relevance._Search, "close", closed)
+        patch.setattr(relevance._RouteSearch, "close", closed)
 
 
 @pytest.fixture(scope="module")

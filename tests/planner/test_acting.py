@@ -13,7 +13,7 @@ from confab.planner.acting.executive import act
 from confab.planner.acting.failure_memory import Caution
 from confab.planner.acting.retries import RetryPolicy
 from confab.planner.acting.symbolic_world import SymbolicWorld
-from confab.planner.acting.world import Report
+from confab.planner.acting.world import WorldReport
 from confab.planner.hierarchical.planner import plan
 from confab.planner.paper.hierarchy import plan as paper_plan
 from confab.planner.paper.learning import learn
@@ -144,7 +144,7 @@ def test_the_robot_does_not_pour_into_a_removed_cup() -> None:
 
 def test_a_primitive_whose_precondition_is_lost_is_not_begun() -> None:
     class Watched(SymbolicWorld):
-        def execute(self, step: Step) -> Report:
+        def execute(self, step: Step) -> WorldReport:
             behavior = self.problem.domain.behaviors[step.behavior]
             assert successor(self.problem, behavior, step.arguments, self.state) is not None, step
             return super().execute(step)
@@ -217,8 +217,8 @@ def test_goals_about_added_objects_are_achieved() -> None:
 
 
 def failing(test: Callable[[Step, State], bool], code: str = "no path") -> Episode:
-    def fault(step: Step, state: State) -> Report | None:
-        return Report(False, code, ("cup2",)) if test(step, state) else None
+    def fault(step: Step, state: State) -> WorldReport | None:
+        return WorldReport(False, code, ("cup2",)) if test(step, state) else None
 
     return act(serving(), SymbolicWorld(serving(), fault=fault), planned())
 
@@ -226,10 +226,10 @@ def failing(test: Callable[[Step, State], bool], code: str = "no path") -> Episo
 def test_a_primitive_without_a_path_is_executed_after_the_obstacle_has_moved() -> None:
     there = at("cup2", "location1")
 
-    def blocked(step: Step, state: State) -> Report | None:
+    def blocked(step: Step, state: State) -> WorldReport | None:
         taken = step.behavior == "B3_REACH_HAND_OBJECT" and step.arguments[1] == "cup1"
         return (
-            Report(False, "no path", ("cup1", "cup2"), "", (there,))
+            WorldReport(False, "no path", ("cup1", "cup2"), "", (there,))
             if taken and state[there.symbol] == there.value
             else None
         )
@@ -277,7 +277,7 @@ def test_an_episode_in_which_every_primitive_fails_is_given_up_soon() -> None:
 
 def test_the_number_of_primitives_is_bounded() -> None:
     class Stubborn(SymbolicWorld):
-        def execute(self, step: Step) -> Report:
+        def execute(self, step: Step) -> WorldReport:
             said = super().execute(step)
             if step.behavior == "B3_LIFT":  # a person puts the cup back again and again
                 self.state[Symbol("LOCATION", ("cup1",))] = "location2"
@@ -289,11 +289,11 @@ def test_the_number_of_primitives_is_bounded() -> None:
     assert len(episode.events) <= 2 * 32 + 10
 
 
-def blocked(step: Step, state: State) -> Report | None:
+def blocked(step: Step, state: State) -> WorldReport | None:
     """An unperceived obstacle: the left hand can't reach the bottle at location3."""
     there = state[Symbol("LOCATION", ("bottle2",))] == "location3"
     hit = step.behavior == "B3_REACH_HAND_OBJECT" and step.arguments == ("left_hand", "bottle2") and there
-    return Report(False, "no path", ("bottle2",)) if hit else None
+    return WorldReport(False, "no path", ("bottle2",)) if hit else None
 
 
 @pytest.mark.parametrize("learning", [True, False])
@@ -401,9 +401,9 @@ def test_interventions_whose_time_never_came_are_listed_as_missed() -> None:
 
 def test_a_primitive_that_reports_a_failure_but_has_its_effects_counts_as_done() -> None:
     class Grumbling(SymbolicWorld):
-        def execute(self, step: Step) -> Report:
+        def execute(self, step: Step) -> WorldReport:
             said = super().execute(step)
-            return Report(False, "object disturbed", ("bottle1",)) if step.behavior == "B3_GRASP" else said
+            return WorldReport(False, "object disturbed", ("bottle1",)) if step.behavior == "B3_GRASP" else said
 
     episode = act(serving(), Grumbling(serving()), planned())
     assert episode.status is End.REACHED
@@ -478,7 +478,7 @@ class Broken(SymbolicWorld):
             raise ConnectionError("no camera")
         return [] if self.how == "observe returns" else super().observe()  # type: ignore[return-value]
 
-    def execute(self, step: Step) -> Report:
+    def execute(self, step: Step) -> WorldReport:
         if self.how == "execute raises" and self.seconds > 3:
             raise RuntimeError("motor 3 is hot")
         return None if self.how == "execute returns" else super().execute(step)  # type: ignore[return-value]

@@ -7,7 +7,7 @@ from random import Random
 
 import pytest
 
-from confab.planner.causal_links import Kind, Need, purposes
+from confab.planner.causal_links import Need, NeedKind, purposes
 from confab.planner.contrast import instead_of
 from confab.planner.hierarchical.planner import plan as default
 from confab.planner.plan import Limits, Plan, Step
@@ -34,9 +34,9 @@ def undone(problem: Problem, plan: Plan, need: Need) -> list[Fault]:
     def put(steps: Sequence[Step], above: tuple[int, ...]) -> tuple[Step, ...]:
         found: list[Step] = []
         for one in steps:
-            found += [step] if need.kind is Kind.LATER and one.path == need.by else []
+            found += [step] if need.kind is NeedKind.LATER and one.path == need.by else []
             found.append(replace(one, steps=put(one.steps, one.path)))
-        at_its_end = need.kind is not Kind.LATER and above == need.by and found
+        at_its_end = need.kind is not NeedKind.LATER and above == need.by and found
         return (*found, step) if at_its_end else tuple(found)
 
     return [fault for fault in validate(wider, Plan(put(plan.steps, ()))) if fault.path != step.path]
@@ -53,7 +53,7 @@ def check(problem: Problem) -> int:
         for need in purpose.needs:
             faults = undone(problem, plan, need)
             assert faults, (path, need)
-            if need.conditions or need.kind in (Kind.GOAL, Kind.ABOVE):
+            if need.conditions or need.kind in (NeedKind.GOAL, NeedKind.ABOVE):
                 assert need.by in {fault.path for fault in faults}, (path, need, faults)
     return sum(len(purpose.needs) for purpose in links.values())
 
@@ -74,7 +74,7 @@ def test_every_step_of_the_tabletop_plan_is_needed_and_steps_of_level_1_for_a_go
     assert plan is not None
     links = purposes(problem, plan)
     assert all(purpose.needs for purpose in links.values())
-    assert {links[step.path].needs[0].kind for step in plan.steps} == {Kind.GOAL}
+    assert {links[step.path].needs[0].kind for step in plan.steps} == {NeedKind.GOAL}
     assert check(problem) > 60
 
 

@@ -6,7 +6,7 @@ from fractions import Fraction
 import pytest
 
 from confab.planner.plan import Plan, Step
-from confab.planner.validation import BehaviorReader, Facts, stretches, successor, validate
+from confab.planner.validation import BehaviorReader, LoggedState, stretches, successor, validate
 from confab.reasoner.amounts import Amount, Quantity
 from confab.reasoner.symbols import (
     FALSE,
@@ -155,7 +155,7 @@ def test_a_fact_that_a_step_makes_true_and_false_is_true() -> None:
 
 
 def test_facts_remember_their_overwritten_values() -> None:
-    facts = Facts(shelves(), shelves().initial)
+    facts = LoggedState(shelves(), shelves().initial)
     assert [facts.value("FULL", (cup,)) for cup in ("cup1", "cup2", "floor")] == [FALSE, TRUE, None]
     assert list(facts.holders("AT", "low")) == [("cup2",), ("cup3",)]
     facts.put("AT", ("cup2",), "high")
@@ -176,7 +176,7 @@ def test_facts_remember_their_overwritten_values() -> None:
 
 def test_individuals_that_satisfy_conditions_are_returned() -> None:
     problem = shelves()
-    facts, kinds = Facts(problem, problem.initial), {"?c": "Cup", "?p": "Place"}
+    facts, kinds = LoggedState(problem, problem.initial), {"?c": "Cup", "?p": "Place"}
     conditions = [has("AT", "?c", "?p"), has("FULL", "?c", TRUE)]
     assert BehaviorReader(problem).satisfied(conditions, {}, kinds, facts) == {"?c": "cup2", "?p": "low"}
     assert BehaviorReader(problem).satisfied(conditions, {"?c": "cup1"}, kinds, facts) is None
@@ -244,7 +244,7 @@ def test_a_step_changes_amounts_and_values_and_its_price_is_calculated() -> None
     assert state is not None
     assert (state[Symbol("FILL", ("cup2",))], state[Symbol("FULL", ("cup2",))]) == ("1", FALSE)
     assert successor(problem, pour, ("cup3",), problem.initial) is None  # the amount would become negative
-    rules, facts = BehaviorReader(problem), Facts(problem, problem.initial)
+    rules, facts = BehaviorReader(problem), LoggedState(problem, problem.initial)
     assert rules.price(pour, ("cup2",), facts) == 3
     assert rules.price(pour, ("cup1",), facts) is None
     assert rules.price(replace(pour, name="FREE", price=None), ("cup2",), facts) is None

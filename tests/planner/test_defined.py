@@ -19,7 +19,7 @@ from confab.planner.hierarchical.operators import Program
 from confab.planner.plan import Limits, Status
 from confab.planner.solve import Request, solve
 from confab.planner.transitions import Table, key_of
-from confab.planner.validation import Facts
+from confab.planner.validation import LoggedState
 from confab.reasoner.amounts import Quantity
 from confab.reasoner.graph.knowledge import load
 from confab.reasoner.pddl.importing import imported
@@ -78,7 +78,7 @@ def test_derived_facts_are_right_in_every_state_of_a_random_walk(seed: int) -> N
     Program(problem).bind(table)
     task = ground(replace(problem, goal={}))
     assert isinstance(task, Task)
-    state, checked = task.initial, Facts(problem, problem.initial)
+    state, checked = task.initial, LoggedState(problem, problem.initial)
     for truth in walk(problem, Random(seed), 4):
         for symbol, value in stated(truth).items():
             if table.now[symbol.situation].get(key_of(symbol.arguments), FALSE) != value:
@@ -218,7 +218,7 @@ def test_all_evaluators_follow_a_chain_of_a_thousand_derived_facts() -> None:
     problem = Problem("boxes", domain, {"Box": boxes, "IN": boxes}, {}, initial, {})
     table = Table(situations, initial)
     Program(problem).bind(table)
-    facts_ = Facts(problem, initial)
+    facts_ = LoggedState(problem, initial)
     for pair_, held in (((boxes[0], boxes[-1]), TRUE), ((boxes[-1], boxes[0]), FALSE)):
         assert table.now["INSIDE"].get(pair_) == held
         assert facts_.value("INSIDE", pair_) == held

@@ -11,7 +11,7 @@ from confab.planner.hierarchical.planner import plan
 from confab.planner.plan import Limits, Plan
 from confab.planner.timed import concurrent
 from confab.planner.timed.call import in_time
-from confab.planner.timed.dispatch import Dispatch, Run, simulated
+from confab.planner.timed.dispatch import Dispatch, DispatchRun, simulated
 from confab.planner.timed.plan import TimedPlan
 from confab.planner.timed.validation import validate_timed
 from confab.reasoner.graph.knowledge import load
@@ -32,7 +32,7 @@ def served() -> tuple[Problem, TimedPlan]:
     return problem, timed
 
 
-def executed(problem: Problem, timed: TimedPlan, seed: int) -> Run:
+def executed(problem: Problem, timed: TimedPlan, seed: int) -> DispatchRun:
     """Return an execution with random durations."""
     rng = Random(seed)
     factors = [Fraction(rng.randint(700, 1300), 1000) for _ in timed.slots]

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import confab
-from confab.planner.causal_links import Kind, purposes
+from confab.planner.causal_links import NeedKind, purposes
 from confab.planner.levels import levels_left
 from confab.planner.plan import Plan, Step, renumbered
 from confab.planner.solve import Mode
@@ -107,7 +107,7 @@ def test_every_step_of_a_joint_refinement_is_explained_and_named() -> None:
     assert {change.fact for change in purpose.gives} == {
         Fact(Symbol("BOOK_AT", (book,)), place) for book, place in (one.arguments for one in node().together)
     }
-    assert {need.kind for need in purpose.needs} == {Kind.GOAL}
+    assert {need.kind for need in purpose.needs} == {NeedKind.GOAL}
     assert str(node()).count("L1_BRING") == 3
     assert [row["behavior"] for row in plan.to_records()].count("L1_BRING") == 3
 

@@ -27,7 +27,7 @@ from confab.planner.plan import Outcome, Plan, Reason, Status, Step
 from confab.planner.validation import validate
 from confab.reasoner.amounts import LESS, MORE
 from confab.reasoner.language import terms
-from confab.reasoner.memory.experience import ITSELF, Experience, GoalKind, Lesson, Method, Order, Tally
+from confab.reasoner.memory.experience import ITSELF, Experience, GoalKind, LearnedOrder, Lesson, Method, Tally
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse_files
 from confab.reasoner.symbols import Problem, RelationCondition, SituationType, ValueCondition, Witness
@@ -333,8 +333,8 @@ def test_regression_gives_rules_whose_conditions_have_roles_and_no_individuals()
 
 
 def test_the_order_of_goals_is_learned_from_several_plans() -> None:
-    orders = [one for one in taught().experience.said.values() if isinstance(one, Order)]
-    first = Order("LOCATION", "BEVERAGE", ((0, 0),))
+    orders = [one for one in taught().experience.said.values() if isinstance(one, LearnedOrder)]
+    first = LearnedOrder("LOCATION", "BEVERAGE", ((0, 0),))
     assert first in orders
     assert first in taught().orders
     assert first.reversed not in taught().orders

@@ -21,7 +21,7 @@ from confab.planner.timed.validation import validate_timed
 from confab.reasoner.generate import write_scene
 from confab.reasoner.graph.knowledge import load
 from confab.reasoner.limits import within
-from confab.reasoner.memory.experience import Measured
+from confab.reasoner.memory.experience import MeasuredDuration
 from confab.reasoner.reading.problem import read
 from confab.reasoner.symbols import (
     TRUE,
@@ -329,7 +329,11 @@ def test_measured_durations_are_used_where_none_is_stated(tmp_path: Path) -> Non
     scene = confab.load(tmp_path / "shelves.ttl")
     memory = Memory.of(scene)
     memory.experience.measure(
-        {("TAKE", ""): Measured(5, 9.0), ("PUT", ""): Measured(5, 4.0), ("PUT", "arm2"): Measured(2, 1.5)}
+        {
+            ("TAKE", ""): MeasuredDuration(5, 9.0),
+            ("PUT", ""): MeasuredDuration(5, 4.0),
+            ("PUT", "arm2"): MeasuredDuration(2, 1.5),
+        }
     )
     timed = scene.plan(["b1 AT s1", "b3 AT s2"], memory, minimise="makespan").timed
     assert timed is not None

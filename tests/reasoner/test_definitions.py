@@ -7,7 +7,7 @@ import pytest
 
 from confab.planner.paper.transitions import Model
 from confab.planner.solve import Request, solve
-from confab.planner.validation import Facts
+from confab.planner.validation import LoggedState
 from confab.reasoner.graph.inference import infer
 from confab.reasoner.graph.knowledge import KnowledgeError, load
 from confab.reasoner.reading.problem import Reading, read
@@ -213,7 +213,7 @@ def test_a_class_that_a_rule_concludes_may_be_named_in_another_definition(tmp_pa
     path = tmp_path / "port.ttl"
     path.write_text(RULED)
     problem = read(load(path)).problem
-    facts = Facts(problem, problem.initial)
+    facts = LoggedState(problem, problem.initial)
     assert [facts.value("SEALED", (box,)) for box in ("box1", "box2")] == ["true", "false"]
     plan = solve(Request(replace(problem, goal={Symbol("SEALED", ("box1",)): "false"}))).plan
     assert plan is not None
@@ -244,5 +244,5 @@ def test_a_static_class_has_the_right_members_even_if_owl_rl_infers_none(
     path = scene(tmp_path, defined(expression), old, near, odd, asked="Item")
     infer(graph := load(path))
     problem = read(graph).problem
-    facts = Facts(problem, problem.initial)
+    facts = LoggedState(problem, problem.initial)
     assert {place for place in problem.classes["Place"] if facts.value("ODD", (place,)) == "true"} - {"hook"} == members

@@ -5,9 +5,11 @@ from copy import deepcopy
 from hypothesis import given
 from hypothesis import strategies as st
 
-from confab.reasoner.memory.experience import ITSELF, Experience, GoalKind, Lesson, Order, Tally
+from confab.reasoner.memory.experience import ITSELF, Experience, GoalKind, LearnedOrder, Lesson, Tally
 
-things = st.sampled_from([GoalKind("LOCATION", ("Cup",)), GoalKind("BEVERAGE", ("Cup",)), Order("A", "B", ((0, 0),))])
+things = st.sampled_from(
+    [GoalKind("LOCATION", ("Cup",)), GoalKind("BEVERAGE", ("Cup",)), LearnedOrder("A", "B", ((0, 0),))]
+)
 facts = st.sampled_from([ITSELF, ("cup is a Bowl", "yes"), ("cup is a Bowl", "no"), ("who is hand", "left_hand")])
 tallies = st.builds(Tally, *[st.integers(0, 2)] * 3)
 counted = st.lists(st.tuples(things, facts, tallies), max_size=3)

@@ -14,11 +14,11 @@ from confab.reasoner.memory.experience import (
     ITSELF,
     Experience,
     GoalKind,
+    LearnedOrder,
     LearnedRule,
     Lesson,
     Method,
     OpenRole,
-    Order,
     Tally,
 )
 from confab.reasoner.memory.experience_file import MOST, lines, load, parse, probability, save, turtle
@@ -37,7 +37,7 @@ def rule(*asks: Condition) -> LearnedRule:
     return LearnedRule(GOAL, asks, ("MOVE", ("?cup", "?place")), KINDS)
 
 
-def written(*said: LearnedRule | Method | Order | GoalKind) -> str:
+def written(*said: LearnedRule | Method | LearnedOrder | GoalKind) -> str:
     experience = Experience("robot")
     experience.learn(Lesson(list(said), [(one, ITSELF, Tally(1)) for one in said]))
     return "".join(turtle(experience, NAMES, DOMAIN))
@@ -54,8 +54,8 @@ def the_rule(text: str) -> LearnedRule:
 
 def test_the_label_of_a_learned_part_describes_its_content() -> None:
     assert label(rule()) == "for cup AT day place: MOVE cup place"
-    assert label(Order("AT", "FULL", ())) == "AT before FULL"
-    assert label(Order("AT", "FULL", ((0, 0),))) == "AT before FULL of the same"
+    assert label(LearnedOrder("AT", "FULL", ())) == "AT before FULL"
+    assert label(LearnedOrder("AT", "FULL", ((0, 0),))) == "AT before FULL of the same"
     assert label(Method("MOVE", 1, (("PICK", (0,)), ("PLACE", (0,))), ())) == "MOVE by PICK, PLACE"
     assert label(GoalKind("AT", ("Cup", "Day"))) == "AT of Cup, Day"
 
@@ -205,7 +205,7 @@ def test_counts_are_read_up_to_the_limit_of_exact_floating_point_numbers() -> No
 
 @pytest.mark.parametrize("space", ["https://x.org/counters/", "https://x.org/counters#"])
 def test_counters_may_have_any_names(space: str) -> None:
-    text = again = written(rule(), Order("AT", "FULL", ()))
+    text = again = written(rule(), LearnedOrder("AT", "FULL", ()))
     for number, counter in enumerate(re.findall(r"(m:counter_\S+) a owl:NamedIndividual", text)):
         again = again.replace(counter + " ", f"<{space}{number}> ")
     assert again != text
@@ -220,7 +220,7 @@ def test_the_parsed_content_of_a_memory_file_is_immutable() -> None:
 def test_a_fact_is_written_once_and_read_from_any_layout() -> None:
     fact = ("cup is", 'odd "one"')
     experience = Experience("robot")
-    for one in (rule(), Order("AT", "FULL", ())):
+    for one in (rule(), LearnedOrder("AT", "FULL", ())):
         experience.learn(Lesson([one], [(one, fact, Tally(1, 2, 3)), (one, ("n", "1"), Tally(failed=1))]))
     text = "".join(turtle(experience, NAMES, DOMAIN))
     assert text.count(":LiftedFact") == 2

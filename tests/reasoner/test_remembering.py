@@ -19,12 +19,12 @@ from confab.reasoner.memory.experience import (
     ITSELF,
     Experience,
     GoalKind,
+    LearnedItem,
+    LearnedOrder,
     LearnedRule,
     Lesson,
     Method,
     OpenRole,
-    Order,
-    Said,
     Tally,
 )
 from confab.reasoner.memory.experience_file import load, pull, push, save
@@ -54,7 +54,7 @@ METHOD = Method(
     (("B2_PICK", (2, 0)), ("B2_PLACE", (2, 1))),
     (OpenRole("Hand", None, "HOLDS"), OpenRole("A|B", ("LOCATION", (0,)), None)),
 )
-SAID: list[Said] = [RULE, Order("LOCATION", "BEVERAGE", ((0, 0), (1, 1))), METHOD]
+SAID: list[LearnedItem] = [RULE, LearnedOrder("LOCATION", "BEVERAGE", ((0, 0), (1, 1))), METHOD]
 
 
 def lived(replica: str, episodes: int) -> Experience:

@@ -17,7 +17,7 @@ from confab.planner.paper.hierarchy import plan
 from confab.reasoner.generate import write_scene
 from confab.reasoner.graph import stores
 from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, load
-from confab.reasoner.graph.stores import Endpoint, connect, on_disk
+from confab.reasoner.graph.stores import RemoteEndpoint, connect, on_disk
 from confab.reasoner.reading.problem import read
 from confab.reasoner.reading.relevance import recognise
 from confab.reasoner.vocabulary import CORE
@@ -165,7 +165,7 @@ def stub(reply: Reply) -> Iterator[str]:
 
 
 def ask(url: str, **options: float) -> list[object]:
-    endpoint = Endpoint(url, timeout=options.get("timeout", 5.0), retries=int(options.get("retries", 3)))
+    endpoint = RemoteEndpoint(url, timeout=options.get("timeout", 5.0), retries=int(options.get("retries", 3)))
     return list(endpoint.query("SELECT ?x { ?x ?y ?z }", {}, {}))  # type: ignore[arg-type]
 
 
@@ -281,9 +281,9 @@ def test_data_that_change_while_they_are_read_are_never_used_for_planning(
         steady.query("SELECT (RAND() AS ?x) {}")  # a query of a user isn't repeated
         assert steady.plan().plan
         sent: list[bytes] = []
-        post = Endpoint._post
+        post = RemoteEndpoint._post
 
-        def meddled(self: Endpoint, body: bytes, accept: str) -> tuple[bytes, str]:
+        def meddled(self: RemoteEndpoint, body: bytes, accept: str) -> tuple[bytes, str]:
             sent.append(body)
             if len(sent) == 5:
                 change = f"DELETE WHERE {{ ?task <{CORE}goal> ?goal }}"
@@ -291,7 +291,7 @@ def test_data_that_change_while_they_are_read_are_never_used_for_planning(
                 assert answer.status == 204
             return post(self, body, accept)
 
-        monkeypatch.setattr(Endpoint, "_post", meddled)
+        monkeypatch.setattr(RemoteEndpoint, "_post", meddled)
         with pytest.raises(KnowledgeError, match=r"changed since they were read; load the scene again"):
             confab.load(url).plan()
         with pytest.raises(KnowledgeError, match="no task with goals"):
@@ -307,7 +307,7 @@ def test_authentication_is_sent_and_never_shown(monkeypatch: pytest.MonkeyPatch)
 
     with stub(reply) as url:
         ask(url.replace("//", "//me:pass%20word@"))
-        assert "pass" not in repr(Endpoint(url.replace("//", "//me:pass@")))
+        assert "pass" not in repr(RemoteEndpoint(url.replace("//", "//me:pass@")))
         monkeypatch.setenv("CONFAB_SPARQL_AUTHORIZATION", "Bearer token")
         with pytest.raises(KnowledgeError, match="there is no scene"):
             connect(url)

@@ -7,7 +7,7 @@ from random import Random
 import pytest
 
 from confab.planner.solve import Request, solve
-from confab.planner.validation import Facts, validate
+from confab.planner.validation import LoggedState, validate
 from confab.reasoner.graph.knowledge import KnowledgeError, load
 from confab.reasoner.reading.goals import with_goals
 from confab.reasoner.reading.problem import read
@@ -122,7 +122,7 @@ def counted(built_in: str, number: str) -> str:
 )
 def test_amounts_are_computed_and_compared(yard: Yard, built_in: str, guarded: bool) -> None:
     problem = read(load(yard(counted(built_in, "14")))).problem
-    assert (Facts(problem, problem.initial).value("GUARDED", ("box3",)) == "true") is guarded
+    assert (LoggedState(problem, problem.initial).value("GUARDED", ("box3",)) == "true") is guarded
 
 
 @pytest.mark.parametrize(

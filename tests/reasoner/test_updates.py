@@ -24,7 +24,7 @@ from confab.reasoner.reading.frame import as_written
 from confab.reasoner.reading.problem import read
 from confab.reasoner.reading.schema import read_schema
 from confab.reasoner.symbols import AmountEffect, Behavior, Comparison
-from confab.reasoner.updates.compiling import Fault
+from confab.reasoner.updates.compiling import UpdateFault
 from confab.reasoner.updates.converting import compiled_again, convert, plainly, situations_of
 from confab.reasoner.updates.writing import update
 from confab.reasoner.validation.validate import validate
@@ -139,8 +139,8 @@ SMALL = """
 HEAD = "DELETE { ?tube :spot ?from } INSERT { ?tube :spot ?slot } WHERE { ?tube a :Tube . ?slot a :Slot . ?tube :spot ?from "
 
 
-def faults(folder: Path, text: str) -> list[Fault]:
-    found: list[Fault] = []
+def faults(folder: Path, text: str) -> list[UpdateFault]:
+    found: list[UpdateFault] = []
     (folder / "small.ttl").write_text(SMALL.replace("TEXT", text))
     load(folder / "small.ttl", faults=found)
     return found

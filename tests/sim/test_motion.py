@@ -7,7 +7,7 @@ from confab.reasoner.embodiment.values import Embodiment, Fixture
 from confab.sim.arms import read_arm
 from confab.sim.attempt import Attempt, rounding
 from confab.sim.bodies import outline
-from confab.sim.collision import Solid, Surroundings, box, free, read_mover
+from confab.sim.collision import Obstacles, Solid, box, free, read_mover
 from confab.sim.motion import MotionLimits, Reacher, connect, leave, line, polyline, pose_of, smooth, timed
 from confab.sim.stages import MARGIN, Stage
 from confab.sim.urdf import Array, Spheres, read_urdf
@@ -25,7 +25,7 @@ def reacher(embodiment: Embodiment, *solids: Solid) -> Reacher:
     model = read_urdf(robot.urdf)
     arm = read_arm(model, hand.arm, hand.tip, hand.turned, hand.home)
     mover = read_mover(model, arm, dict.fromkeys(hand.fingers, hand.opening))
-    return Reacher(mover, Surroundings((*map(box, embodiment.fixtures), *solids)), MARGIN)
+    return Reacher(mover, Obstacles((*map(box, embodiment.fixtures), *solids)), MARGIN)
 
 
 def pillar() -> Solid:
@@ -193,13 +193,13 @@ def test_a_hand_accepts_a_smaller_clearance_if_no_alternative_exists(moved: Case
 def test_corners_of_a_path_are_rounded_only_as_far_as_obstacles_permit(serving: Case) -> None:
     """Some posts beside a path are far enough from the path, but would be too near to the rounded path."""
     corner, aside, down = np.array([0.45, 0.2, 0.95, 0.0, 0.0, 0.6]), np.eye(6)[1], np.eye(6)[2]
-    alone = replace(reacher(serving.embodiment), around=Surroundings())
+    alone = replace(reacher(serving.embodiment), around=Obstacles())
     q = alone.solve(polyline(np.array([corner - 0.15 * aside, corner, corner - 0.15 * down])))[0]
     assert rounding(alone, q) == 3
     near = []
     for middle in corner[:3] + np.random.default_rng(0).uniform([-0.1, -0.15, -0.15], [0.2, 0.0, 0.0], (1200, 3)):
         post = Solid("post", "box", np.full(3, 0.005), middle, np.eye(3))
-        among = replace(alone, around=Surroundings((post,)))
+        among = replace(alone, around=Obstacles((post,)))
         near += [among] if among.free(q).all() and not among.free(smooth(q, 3)).all() else []
     assert near
     assert all(rounding(among, q) < 3 for among in near)

@@ -14,7 +14,7 @@ from confab.scene import Scene
 from confab.sim.attempt import Attempt
 from confab.sim.faults import stranger
 from confab.sim.rollouts import Trial
-from confab.sim.running import Run
+from confab.sim.running import SkillRun
 from confab.sim.staging import Perturbation
 from confab.sim.verdict import REFUTED, SkillError
 from confab.sim.verify import expectations
@@ -144,7 +144,7 @@ def test_a_place_of_the_load_is_no_place_for_the_load(tmp_path: Path) -> None:
     one = scene("stack", tmp_path)
     with PhysicsWorld(one.embodiment, one.problem.initial) as world:
         holding = replace(Attempt.begin(world, "left_hand"), held="b")
-        run = Run(holding, {"target": "p4"}, {})
+        run = SkillRun(holding, {"target": "p4"}, {})
         with pytest.raises(SkillError, match="p4 is a place of b, which the hand carries") as raised:
             run.at("target")
     assert raised.value.verdict.code in REFUTED
