@@ -414,7 +414,7 @@ def _by_definitions(lowest: Lowest) -> Certificate | None:
 
 
 def _by_pairs(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
-    """Return a certificate that two goals about the same individual, and the rest values, can't hold together."""
+    """Return a certificate that two goals about the same individual can't both hold when all symbols have their rest values."""
     pairs = []
     for (one, a), (other, b) in combinations(sorted(lowest.problem.goal.items()), 2):
         if a in other.arguments or b in one.arguments:  # pairs whose goals mention each other's values come first

@@ -44,7 +44,7 @@ class Folding:
     known: frozenset[Condition] = frozenset()
 
     def effects(self, effects: Iterable[AmountEffect]) -> tuple[AmountEffect, ...]:
-        """Return the effects on amounts without effects that never happen; equal effects are combined."""
+        """Return the effects on amounts that can occur; equal effects are combined."""
         found = Counter[AmountEffect]()
         for effect in effects:
             when = self.conjunction(effect.when)

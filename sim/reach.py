@@ -37,7 +37,7 @@ SPARE = 0.01
 """Distance in metres by which an object may stand farther away than its place."""
 
 LAYERS = 3
-"""Maximum number of movable bodies, one standing on another, for whose places reach is computed."""
+"""Maximum height of a stack of movable bodies, in bodies; reach of the places on higher bodies isn't computed."""
 
 STAGES = ("when grasping", "when approaching", "when lifting")
 """Names of the stages of a grasp, in the order of `grip_stages`."""

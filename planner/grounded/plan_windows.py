@@ -420,7 +420,7 @@ class _Windows:
         return part, operators
 
     def _part_with_amounts(self, amounts: Amounts, operators: Sequence[int], state: int, wanted: int) -> Task:
-        """Return the task of a window of steps, with all bits of the whole task.
+        """Return the planning task of a window of steps; its states use the same bits as the states of the whole task.
 
         In a state with amounts, the number of the tuple of amounts is stored above the bits of the whole task.
         """

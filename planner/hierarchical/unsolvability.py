@@ -29,7 +29,7 @@ FIRST_TESTS, AT_ONCE, PAIRS = 8_000, 20_000, 500_000
 
 The first limit holds before a search, the second in the paper's mode, and the third after failed searches.
 """
-TEST = 16
+TEST = 8
 """Work of testing one condition, in the unit of `Workspace.effort`."""
 FEW = 1_000
 """The lowest level is examined when the searches have cost as much as examining this number of its states."""

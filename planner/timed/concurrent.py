@@ -459,7 +459,7 @@ class _Finder:
         return {}
 
     def times(self, node: _SearchNode, ending: Mapping[int, int]) -> list[int] | None:
-        """Return the earliest begins of a node's steps if the running steps in `ending` end next.
+        """Return the earliest begin of each step of a node, given that the running steps in `ending` are the next to end.
 
         The last entry is the time from the begin of the first ending step to the events that its end must wait for. Return None if
         a step would end too late.

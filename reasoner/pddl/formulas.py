@@ -41,7 +41,7 @@ class FunctionTerm:
 
 @dataclass(frozen=True)
 class Arithmetic:
-    """The arithmetic operation `sign` on two numbers."""
+    """An arithmetic operation on two numbers; `sign` is ``+``, ``-``, ``*`` or ``/``."""
 
     sign: str
     left: NumericTerm

@@ -62,8 +62,9 @@ def test_the_reason_is_the_cause_that_no_behaviour_changes(mode: Mode) -> None:
     )
 
 
-def test_goals_about_one_object_that_exclude_each_other_given_rest_values_are_unsolvable() -> None:
-    outcome = confab.load("beverage-serving").plan("left_hand HOLDS cup1", mode="paper", time_limit=20.0).outcome
+@pytest.mark.parametrize("mode", ["guarded", "paper"])
+def test_goals_about_one_object_that_exclude_each_other_given_rest_values_are_unsolvable(mode: Mode) -> None:
+    outcome = confab.load("beverage-serving").plan("left_hand HOLDS cup1", mode=mode, time_limit=20.0).outcome
     assert outcome.status is Status.UNSOLVABLE and outcome.certificate is not None
     goals = {"left_hand HOLDS cup1", "cup1 LOCATION location7", "left_hand HAND_POSITION raised"}
     assert {str(fact) for fact in outcome.certificate.unmet} == goals
