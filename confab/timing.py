@@ -63,10 +63,12 @@ def concurrent(problem: Problem, deadline: Deadline) -> tuple[Outcome, TimedPlan
 def scheduled(
     problem: Problem, outcome: Outcome, deadline: Deadline, shorten: bool
 ) -> tuple[Outcome, TimedPlan | None]:
-    """Schedule the plan of an outcome.
+    """Schedule the plan of an outcome; the cost and the levels left are those of the scheduled plan, which may have other steps.
 
     If no schedule meets the deadlines and windows of the task, the outcome's status becomes "gave up".
     """
+    from confab.planner.levels import levels_left
+    from confab.planner.plan_costs import cost_of
     from confab.planner.timed.call import best_in_time
 
     if outcome.plan is None:
@@ -74,7 +76,9 @@ def scheduled(
     timed = best_in_time(problem, outcome.plan, deadline.left, shorten)
     if timed.plan is None:
         return replace(outcome, status=Status.GAVE_UP, plan=None, reason=timed.reason, left=(), cost=None), None
-    return replace(outcome, plan=timed.plan.plan), timed.plan
+    plan = timed.plan.plan
+    cost = None if outcome.cost is None else cost_of(problem, plan)
+    return replace(outcome, plan=plan, cost=cost, left=tuple(levels_left(problem, plan))), timed.plan
 
 
 def needs_others_meanwhile(problem: Problem) -> bool:

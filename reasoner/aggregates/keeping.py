@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 
 from confab.reasoner.afterwards import (
@@ -117,9 +118,9 @@ def _timed(
             amounts=tuple(effect for effect in made if isinstance(effect, AmountEffect)),
         )
         holding = [condition for at, condition in timing.conditions if at in (span, Span.THROUGHOUT)]
-        found = _Keeping(part, aggregate, situations, classes, holding).behavior()
-        behavior = replace(behavior, variables=found.variables)
-        effects += [(span, effect) for effect in found.amounts[len(part.amounts) :]]
+        keeping = _Keeping(part, aggregate, situations, classes, holding)
+        behavior = replace(behavior, variables=keeping.behavior().variables)
+        effects += [(span, effect) for effect in keeping.made]
     return replace(behavior, timing=replace(timing, effects=tuple(effects)))
 
 
@@ -170,15 +171,20 @@ class _Keeping:
         if not self.forbidden and sum(1 for one in self.candidates if one.term is None) > MOST_COMPARED:
             raise TooManyCasesError
 
-    def behavior(self) -> Behavior:
-        """Return the behaviour with the effects on the total."""
+    @cached_property
+    def made(self) -> tuple[AmountEffect, ...]:
+        """The effects on the total."""
         effects, many = list[AmountEffect](), 0
         for effect in (effect for i in range(len(self.candidates)) for effect in self.effects(i)):
             effects.append(effect)
             many += sum(1 for condition in effect.when for _ in walk(condition))
             if many > MOST_CONDITIONS:
                 raise TooManyCasesError
-        known = self.own.kinds
+        return tuple(effects)
+
+    def behavior(self) -> Behavior:
+        """Return the behaviour with the effects on the total."""
+        effects, known = self.made, self.own.kinds
         used = {
             t for e in effects for t in (*e.arguments, *terms_of(e.amount), *(m for c in e.when for m in mentions(c)))
         }

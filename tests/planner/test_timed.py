@@ -287,6 +287,46 @@ def test_an_effect_on_all_members_of_a_class_leaves_the_members_without_the_effe
     assert [result.timed.serial, result.timed.makespan] == [Fraction(20), Fraction(10)]
 
 
+FUELLED = """
+:Shelf c:hasSituationType :FUEL, :MIXED .
+:FUEL a owl:NamedIndividual, c:SituationType, c:Amount ; c:valueProperty :fuel ; c:leastAmount 0.0 .
+:fuel a owl:DatatypeProperty, owl:FunctionalProperty, owl:NamedIndividual ; rdfs:domain :Shelf ; rdfs:range xsd:decimal .
+:s1 :fuel 1.0 . :s2 :fuel 1.0 .
+:MIXED a owl:Class, owl:NamedIndividual, c:SituationType ; c:never true .
+:MIXED.rule a owl:NamedIndividual, c:Rule ; c:construct '''CONSTRUCT { ?shelf :MIXED true } WHERE {
+  ?shelf a :Shelf . ?raw a :Book ; :at ?shelf FILTER NOT EXISTS { ?raw :BAKED true }
+  ?baked a :Book ; :at ?shelf ; :BAKED true }''' .
+"""
+"""Each shelf has fuel for one baking, and never holds raw and baked books at once."""
+BURNING = """DELETE { ?shelf :fuel ?f } INSERT { ?shelf :fuel ?g }
+  WHERE { ?shelf a :Shelf ; :fuel ?f FILTER(?f >= 1) BIND(?f - 1 AS ?g) }"""
+
+
+def test_a_behaviour_whose_effects_keep_a_constraint_uses_its_own_amounts_once(tmp_path: Path) -> None:
+    (tmp_path / "shelves.ttl").write_text(
+        SHELVES + OVEN.replace("INSERT {} WHERE { ?shelf a :Shelf }", BURNING) + FUELLED
+    )
+    result = confab.load(tmp_path / "shelves.ttl").plan(["b3 BAKED true", "b4 BAKED true"], minimise="makespan")
+    assert result.timed is not None, result
+    assert result.timed.makespan == 10
+
+
+WAGES = """
+:wage a owl:DatatypeProperty, owl:NamedIndividual, c:Relation ; rdfs:domain :Arm ; rdfs:range xsd:decimal .
+:arm1 :wage 1.0 . :arm2 :wage 5.0 . :PUT c:price :PUT.wage .
+:PUT.wage a owl:NamedIndividual, c:Calculation ; c:relation :wage ; c:about :PUT.arm .
+"""
+
+
+def test_a_schedule_that_shares_the_work_costs_what_its_own_steps_cost(tmp_path: Path) -> None:
+    (tmp_path / "shelves.ttl").write_text(SHELVES + WAGES)
+    scene = confab.load(tmp_path / "shelves.ttl")
+    goals = ["b1 AT s1", "b2 AT s1", "b3 AT s2", "b4 AT s2"]
+    assert scene.plan(goals).outcome.cost == 8
+    result = scene.plan(goals, minimise="makespan")
+    assert result.outcome.cost == result.cost == 16
+
+
 def test_the_bound_of_any_plan_is_not_above_the_least_makespan() -> None:
     bounds, least = [], []
     for seed in range(13_000, 13_200):
