@@ -200,7 +200,7 @@ def behind(memory: Memory, name: str) -> str:
     those = {replica for (replica, epoch), counts in memory.experience.counts.items() if not epoch and name in counts}
     lived = ", ".join(f"{memory.experience.episodes.get(replica, 0)} of {replica}" for replica in sorted(those))
     of = f", within the episodes {lived}" if lived else ""
-    return f"chosen {tally.chosen}, passed over {tally.passed_over}, failed {tally.failed} times{of}"
+    return f"chosen {tally.chosen}, passed over {tally.passed_over}, failed {tally.failed} time{'s' * (tally.failed != 1)}{of}"
 
 
 def _best(alternatives: Sequence[RuleInstance], advisor: Advisor, reader: FactReader) -> RuleInstance | None:

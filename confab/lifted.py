@@ -88,7 +88,7 @@ class Sayings:
     def rule(self, rule: LearnedRule) -> str:
         """Return a rule as a sentence."""
         said = sorted(rule.asks, key=lambda c: isinstance(c, Witness | RelationCondition))
-        asks = [self.condition(c) for c in said]
+        asks = [*dict.fromkeys(map(self.condition, said))]  # several conditions may enforce one constraint
         left = len(asks) - MOST_SAID
         more = f" and {left} more condition{'s' * (left > 1)}" if left > 0 else ""
         when = f", when {', '.join(asks[:MOST_SAID])}{more}" if asks else ""

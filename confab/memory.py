@@ -394,7 +394,8 @@ class Memory(metaclass=RightNames):
 
         say, totals = self.sayings(), self.experience.totals()
         orders = [
-            f"{say.said(order)}: so in {totals[order.name][ITSELF].chosen} cases" for order in usable(self.experience)
+            f"{say.said(order)}: so in {counted(totals[order.name][ITSELF].chosen, 'case')}"
+            for order in usable(self.experience)
         ]
         methods = [one for one in self.experience.said.values() if isinstance(one, Method)]
         liked = self.experience.preferences(DECAY)
@@ -405,7 +406,7 @@ class Memory(metaclass=RightNames):
         return [
             *orders,
             *(
-                f"{text}: {times} times{''.join(f'; {who}' for who in preferred(say, facts))}"
+                f"{text}: {counted(times, 'time')}{''.join(f'; {who}' for who in preferred(say, facts))}"
                 for times, text, facts in sorted(counted_, key=lambda row: (-row[0], row[1]))
             ),
         ]

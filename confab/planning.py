@@ -451,7 +451,7 @@ class Result(metaclass=RightNames):
             return ""
         if self.optimal:
             return "a longer time limit (--time-limit, in Python time_limit) may prove more, or find a better plan"
-        how = "--optimal (in Python optimal=True) looks for a cheaper one"
+        how = "--optimal or --time-limit (in Python optimal=True, time_limit=S) looks for a cheaper one"
         if circles := in_circles(self.problem, self.plan):
             of = len(self.plan.primitives)
             return f"{circles} of the {of} primitives only undo each other (the steps above ask for them); {how}"

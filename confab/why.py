@@ -334,7 +334,7 @@ def _sentence(need: Need, steps: Steps, number: Mapping[Path, str], labels: Labe
     by = f"“{labels.step(steps[need.by])}” ({number[need.by]})"
     if need.kind is NeedKind.ABOVE:
         return f"it achieves an effect of {by}: {facts}"
-    asks = " and ".join(labels.condition(condition) for condition in need.conditions)
+    asks = " and ".join(dict.fromkeys(map(labels.condition, need.conditions)))
     if not asks:
         return f"the effect of {by} depends on it: {facts}"
     if asks == facts:
@@ -343,7 +343,7 @@ def _sentence(need: Need, steps: Steps, number: Mapping[Path, str], labels: Labe
 
 
 def _instead(changes: Sequence[FactChange], labels: Labels) -> str:
-    return "before this step, " + " and ".join(labels.fact(replace(c.fact, value=c.before)) for c in changes)
+    return "without this step, " + " and ".join(labels.fact(replace(c.fact, value=c.before)) for c in changes)
 
 
 # -------------------------------------------------------------------------------------------------------------- why not
@@ -467,11 +467,9 @@ def _fact_told(
     soft: Mapping[Fact, Fraction],
 ) -> WhyNot:
     about, of, *_ = fact.split()
-    goals = [
-        str(Fact(symbol, value))
-        for symbol, value in sorted(problem.goal.items())
-        if (symbol.arguments[:1], symbol.situation) != ((about,), of) or symbol.arguments[1:]
-    ]
+    given = [Fact(*goal) for goal in sorted(problem.goal.items())]
+    replaced = [goal for goal in given if goal.symbol == Symbol(of, (about,))]
+    goals = [str(goal) for goal in given if goal not in replaced]
     try:
         symbol, value = parse_fact(problem, fact)
     except KnowledgeError:  # the whole scene may have an individual that the problem lacks
@@ -482,6 +480,7 @@ def _fact_told(
         if problem.goal.get(symbol) != value:
             problem, outcome, labels = replan([*goals, fact])
     words = labels.fact(Fact(symbol, value))
+    others = [labels.fact(goal) for goal in replaced if goal.value != value]
     weight = soft.get(Fact(symbol, value))
     kind = "goal" if weight is None else f"soft goal (weight {written(weight)})"
     if by is None and problem.goal.get(symbol) == value and outcome.plan is plan:
@@ -495,16 +494,17 @@ def _fact_told(
             found = with_choice(problem, outcome.plan or plan, Symbol(symbol.situation, symbol.arguments), by, ask)
         except NoChoiceError as error:
             return WhyNot(asked, str(error))
-        words += f", with {labels.name(by)} in every step that changes {symbol}"
+        words += f", with {labels.name(by)} in every step that changes “{labels.about(symbol)}”"
         found = replace(found, before=before)
     else:
         cost = None if outcome.plan is None else cost_of(problem, outcome.plan)
         found = Contrast(before, plan=outcome.plan, cost=cost, reason=outcome.reason)
+    words += f", in place of the goal that {' and '.join(others)}," if others else ""
     if found.plan is None:
         which = "" if weight is None else f"the {kind} "
         return WhyNot(
             asked,
-            f"no plan achieves {which}that {words}: {found.reason.text if found.reason else 'no reason is known'}",
+            f"no plan achieves {which}that {words.removesuffix(',')}: {found.reason.text if found.reason else 'no reason is known'}",
         )
     return _planned(asked, f"the {kind} that {words}", problem, plan, labels, found)
 

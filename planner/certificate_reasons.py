@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 from confab.planner.certificate_checks import Cases, CaseView, Claims, own_variables, unified
@@ -17,6 +17,7 @@ from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AmountEffect,
+    AnyOf,
     Behavior,
     ClassCondition,
     Condition,
@@ -433,7 +434,25 @@ class _Causes:
     def _all(self, conditions: Sequence[Condition], given: dict[str, str], kinds: Mapping[str, str]) -> str:
         """Return a conjunction as text; variables without a value are written as their classes."""
         named = {**given, **{name: f"some {kind}" for name, kind in kinds.items() if name not in given}}
-        return " and ".join(said(substituted(condition, named)) for condition in conditions)
+        return " and ".join(said(substituted(possible(substituted(c, given)), named)) for c in conditions)
+
+
+def possible(condition: Condition) -> Condition:
+    """Return a disjunction without the alternatives that an equality of two individuals makes false."""
+    if not isinstance(condition, AnyOf) or condition.negated:
+        return condition
+    groups = [group for group in condition.alternatives if not any(map(false_equality, group))]
+    if len(groups) == 1 and len(groups[0]) == 1 and condition.constraint is None:
+        return groups[0][0]
+    return replace(condition, alternatives=tuple(groups or condition.alternatives))
+
+
+def false_equality(condition: Condition) -> bool:
+    """Return whether a condition is an equality that is false for all values of its variables."""
+    match condition:
+        case EqualityCondition(left, right, negated):
+            return negated if left == right else not negated and "?" not in (left[0], right[0])
+    return False
 
 
 def variables_of(expression: Expression) -> set[str]:

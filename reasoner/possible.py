@@ -113,11 +113,13 @@ def values_at_fault(state: State, domain: Domain, declared: Container[str]) -> I
         if quantity is not None and (limits := _limits(value, quantity)):
             name, remedy = symbol.situation, "state such an amount"
             if name in domain.constraints:
+                constraint = domain.constraints[name]
+                about = f" of {' and '.join(symbol.arguments)}" if symbol.arguments else ""
                 yield Impossible(
                     symbol,
-                    f"{domain.constraints[name]}, and it is {'false' if domain.constraints[name].always else 'true'} here",
+                    f"{constraint}, and it is {'false' if constraint.always else 'true'}{about} here",
                     "constraints hold in every state, from the first one on",
-                    f"change the facts from which {domain.constraints[name].situation} follows, or its rule",
+                    f"change the facts from which {constraint.situation} follows, or its rule",
                 )
                 continue
             if name in domain.aggregates:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from itertools import product
 
@@ -67,10 +68,15 @@ def exceptions(
     relations: Mapping[str, frozenset[tuple[str, ...]]],
     state: Mapping[Symbol, str],
 ) -> dict[Symbol, str]:
-    """Return the number of violations of each constraint in a state."""
+    """Return the number of violations of each constraint in a state; for a violated constraint, for each row of individuals."""
     found: dict[Symbol, str] = {}
     for name in domain.constraints:
-        found |= totals(domain.aggregates[name], classes, relations, state, domain.situations)
+        rule = domain.aggregates[name]
+        count = totals(rule, classes, relations, state, domain.situations)
+        if count != {Symbol(name, ()): "0"}:
+            by_row = replace(rule, parameters=rule.variables, variables=())
+            count = totals(by_row, classes, relations, state, domain.situations)
+        found |= count
     return found
 
 

@@ -325,7 +325,7 @@ def triples(block: Sequence[Any]) -> Iterator[Triple]:
         if not isinstance(subject, Word):
             raise UpdateError(
                 "a pattern begins with something that has no name",
-                "begin it with a variable or an individual",
+                "begin it with a variable or an individual; a list comes last, as in ?from :WAY (?to ?m)",
                 where.at,
             )
         yield Triple(subject, where, _value(value, cells, where.at))

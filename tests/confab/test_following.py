@@ -24,7 +24,7 @@ def test_the_reason_for_a_step_names_the_facts_from_which_a_defined_goal_follows
 
 
 def test_a_defined_condition_is_explained_with_the_fact_that_violated_it_before() -> None:
-    asks = "“put ring into casket” (L1#1) requires that casket isn't out of reach; before this step, chest is shut"
+    asks = "“put ring into casket” (L1#1) requires that casket isn't out of reach; without this step, chest is shut"
     assert asks in needs("packing-small", "L1#0")
 
 

@@ -9,9 +9,12 @@ import confab
 from confab.cli import app
 from confab.labels import Labels
 from confab.lifted import Sayings
+from confab.reasoner.memory.experience import LearnedRule
 from confab.reasoner.sentences import denied
 from confab.reasoner.symbols import (
+    AnyOf,
     Condition,
+    Constraint,
     Domain,
     EqualityCondition,
     Fact,
@@ -63,6 +66,12 @@ def test_a_value_that_names_the_state_is_written_without_the_property() -> None:
 def test_a_negated_fact_is_written_with_a_negated_verb() -> None:
     assert denied("hand can reach location") == "hand can't reach location"
     assert denied("FERRY EMPTY") == "not FERRY EMPTY"
+
+
+def test_two_conditions_that_enforce_one_constraint_are_written_once() -> None:
+    asks = [AnyOf(((OF_LOCK,),), True, Constraint("FLOOD")), AnyOf(((SHUT,),), True, Constraint("FLOOD"))]
+    rule = LearnedRule(Fact(Symbol("IN", ("?boat",)), "?lock"), tuple(asks), ("ENTER", ("?boat",)), ())
+    assert Sayings(LABELS).rule(rule).count("FLOOD is never true") == 1
 
 
 def test_a_memory_of_a_shipped_scene_is_shown_in_its_labels_without_naming_the_scene(tmp_path: Path) -> None:

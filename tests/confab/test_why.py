@@ -164,6 +164,11 @@ def test_an_alternative_may_name_the_hand_that_takes_part(serving: confab.Result
     assert serving.why_not("cup1 LOCATION location7").more == 0
 
 
+def test_the_answer_about_another_goal_names_the_goal_that_it_replaces(serving: confab.Result) -> None:
+    answer = serving.why_not("cup2 LOCATION location8").answer
+    assert "cup 2 is at location 8, in place of the goal that cup 2 is at location 5, is possible" in answer
+
+
 def test_another_goal_is_planned_as_an_alternative(serving: confab.Result) -> None:
     told = serving.why_not("cup2 LOCATION location8")
     assert told.more is not None

@@ -101,7 +101,7 @@ def test_explanations_name_the_constraint() -> None:
         ("c:fromLevel 2 ; c:valueProperty :at", "c:never true ; c:valueProperty :at", "AT has other values"),
         ("c:never true", "c:never true ; c:always true", "has both c:never and c:always; keep one"),
         ("{ ?bay a :Bay . ?one", "{ ?bay a :Bay ; :CLASH true . ?one", "CLASH must never be true, but .* recursively"),
-        ("d:in :bay2", "d:in :bay1", "CLASH must never be true, and it is true here"),
+        ("d:in :bay2", "d:in :bay1", "CLASH must never be true, and it is true of bay1 here"),
         ("c:never true", 'c:never "maybe"', "never is 'maybe'; wanted true or false"),
     ],
 )

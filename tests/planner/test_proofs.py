@@ -274,6 +274,9 @@ def test_failing_conditions_are_written_as_readable_sentences() -> None:
     assert reason(pair, "?c:Cup ?p:Place ?h:Hand ?q:Place") == (
         "some Hand canReach some Place and cup1 fits some Place, which nothing satisfies"
     )
+    other = EqualityCondition("?c", "cup2", negated=True)
+    either = AnyOf(((other,), (RelationCondition("fits", ("?c", "?p")),)))
+    assert reason([either]) == "cup2 fits sink, which does not hold"
 
 
 def test_a_goal_on_an_unknown_fact_or_without_an_achiever_is_reported() -> None:

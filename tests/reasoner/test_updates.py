@@ -157,6 +157,7 @@ def faults(folder: Path, text: str) -> list[UpdateFault]:
         (HEAD + ".\n MINUS { ?tube :fits ?slot } }", "MINUS isn't supported", "FILTER NOT EXISTS", (2, 10)),
         (HEAD + ".\n FILTER(REGEX(?a, 'b')) }", "this FILTER isn't supported", "compare two terms", (2, 15)),
         (HEAD + ".\n ?tube :spot 3 }", "the number 3 is in the place of an individual", "name an individual", (2, 8)),
+        (HEAD + ".\n (?tube ?slot) :fits ?from }", "begins with something that has no name", "a list comes last", (2, 16)),
         (HEAD + ".\n ?tube x:spot ?y }", "the prefix 'x:' isn't declared", "declare it", (2, 8)),
         ("DELETE { ?t :spot ?s } WHERE { ?t a :Tube ; :spot ?s }", "would have none", "insert the one", (1, 13)),
         ("INSERT { ?t :fits ?s } WHERE { ?t a :Tube . ?s a :Slot }", "nothing changes", "property of a situation", (1, 13)),
