@@ -499,13 +499,11 @@ def _fact_told(
     else:
         cost = None if outcome.plan is None else cost_of(problem, outcome.plan)
         found = Contrast(before, plan=outcome.plan, cost=cost, reason=outcome.reason)
-    words += f", in place of the goal that {' and '.join(others)}," if others else ""
     if found.plan is None:
         which = "" if weight is None else f"the {kind} "
-        return WhyNot(
-            asked,
-            f"no plan achieves {which}that {words.removesuffix(',')}: {found.reason.text if found.reason else 'no reason is known'}",
-        )
+        reason = found.reason.text if found.reason else "no reason is known"
+        return WhyNot(asked, f"no plan achieves {which}that {words}: {reason}")
+    words += f", in place of the goal that {' and '.join(others)}," if others else ""
     return _planned(asked, f"the {kind} that {words}", problem, plan, labels, found)
 
 

@@ -449,10 +449,10 @@ def possible(condition: Condition) -> Condition:
 
 def false_equality(condition: Condition) -> bool:
     """Return whether a condition is an equality that is false for all values of its variables."""
-    match condition:
-        case EqualityCondition(left, right, negated):
-            return negated if left == right else not negated and "?" not in (left[0], right[0])
-    return False
+    if not isinstance(condition, EqualityCondition):
+        return False
+    left, right = condition.left, condition.right
+    return condition.negated if left == right else not condition.negated and "?" not in (left[0], right[0])
 
 
 def variables_of(expression: Expression) -> set[str]:

@@ -70,7 +70,7 @@ def test_a_negated_fact_is_written_with_a_negated_verb() -> None:
 
 def test_two_conditions_that_enforce_one_constraint_are_written_once() -> None:
     asks = [AnyOf(((OF_LOCK,),), True, Constraint("FLOOD")), AnyOf(((SHUT,),), True, Constraint("FLOOD"))]
-    rule = LearnedRule(Fact(Symbol("IN", ("?boat",)), "?lock"), tuple(asks), ("ENTER", ("?boat",)), ())
+    rule = LearnedRule(ValueCondition("IN", ("?boat",), "?lock"), tuple(asks), ("ENTER", ("?boat",)), ())
     assert Sayings(LABELS).rule(rule).count("FLOOD is never true") == 1
 
 

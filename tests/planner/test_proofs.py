@@ -18,6 +18,7 @@ from confab.reasoner.amounts import Quantity
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
+    AnyOf,
     Behavior,
     ClassCondition,
     Condition,
@@ -276,7 +277,7 @@ def test_failing_conditions_are_written_as_readable_sentences() -> None:
     )
     other = EqualityCondition("?c", "cup2", negated=True)
     either = AnyOf(((other,), (RelationCondition("fits", ("?c", "?p")),)))
-    assert reason([either]) == "cup2 fits sink, which does not hold"
+    assert reason([either]) == "cup2 fits sink, which never holds"
 
 
 def test_a_goal_on_an_unknown_fact_or_without_an_achiever_is_reported() -> None:
