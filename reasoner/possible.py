@@ -96,14 +96,14 @@ def refuse_impossible(problem: Problem, before: State, after: State, cause: str 
 
 
 def refuse_derived(domain: Domain, facts: Iterable[Fact], cause: str = "") -> None:
-    """Raise `ImpossibleStateError` if a fact is a derived amount, or makes a remembered situation type false."""
+    """Raise `ImpossibleStateError` if a rule defines a fact's situation type, or a fact makes a remembered type false."""
     for fact in facts:
-        if (name := fact.symbol.situation) in domain.aggregates:
+        if (name := fact.symbol.situation) in domain.rules or name in domain.aggregates:
             text = f"a rule defines {name}; change a fact that it follows from"
-            raise ImpossibleStateError(f"{cause or fact}: {text}")
+            raise ImpossibleStateError(f"{cause}: {text}" if cause else text)
         if name in domain.remembers and fact.value == FALSE:
             text = f"{name} remembers {domain.remembers[name]}, so it never becomes false; leave the fact out"
-            raise ImpossibleStateError(f"{cause or fact}: {text}")
+            raise ImpossibleStateError(f"{cause}: {text}" if cause else text)
 
 
 def values_at_fault(state: State, domain: Domain, declared: Container[str]) -> Iterator[Impossible]:

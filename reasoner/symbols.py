@@ -545,6 +545,12 @@ class Domain:
     constraints: Mapping[str, Constraint] = field(default_factory=dict)
     remembers: Mapping[str, str] = field(default_factory=dict)
 
+    @cached_property
+    def authored(self) -> frozenset[str]:
+        """The situation types of the author; the names of added situation types extend such a name by a dot and further text."""
+        names = self.situations.keys()
+        return frozenset(name for name in names if not any(name[:i] in names for i, c in enumerate(name) if c == "."))
+
     @property
     def levels(self) -> tuple[int, ...]:
         """The levels with behaviours, beginning with the most abstract level."""

@@ -20,8 +20,8 @@ from confab.reasoner.aggregates.totals import following
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import LimitError
 from confab.reasoner.names import nearest
-from confab.reasoner.possible import refuse_impossible
-from confab.reasoner.symbols import FALSE, TRUE, Problem, Symbol
+from confab.reasoner.possible import refuse_derived, refuse_impossible
+from confab.reasoner.symbols import FALSE, TRUE, Fact, Problem, Symbol
 
 if TYPE_CHECKING:
     from confab.execution import Execution
@@ -133,6 +133,8 @@ class Sheet:
             if wanted is not None:
                 goal[symbols[key]] = wanted
         with possible():
+            facts = by.get("facts", {}).items()
+            refuse_derived(self.problem.domain, [Fact(symbols[key], value) for key, value in facts])
             refuse_impossible(self.problem, self.problem.initial, initial)
         turned = replace(self.problem, initial=initial, goal=goal)
         if goal or not by.get("goals"):

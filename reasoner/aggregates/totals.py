@@ -93,7 +93,7 @@ def totals(
     situations: Mapping[str, SituationType],
 ) -> dict[Symbol, str]:
     """Return the values of a sum or count for all of its arguments in a state, as texts of exact numbers."""
-    world = _EnumeratedState(classes, relations, state, situations)
+    world = EnumeratedState(classes, relations, state, situations)
     kinds = [classes.get(p.kind, ()) for p in aggregate.parameters]
     found = {row: Fraction(0) for row in product(*kinds)}
     solutions = set[tuple[str, ...]]()
@@ -107,7 +107,7 @@ def totals(
     return {Symbol(aggregate.situation, row): written(number) for row, number in found.items()}
 
 
-class _EnumeratedState:
+class EnumeratedState:
     """A state in which conditions are evaluated by enumeration of individuals."""
 
     def __init__(

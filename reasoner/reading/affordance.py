@@ -19,11 +19,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from itertools import product
 
 import pyoxigraph as ox
 
-from confab.reasoner.amounts import Amount, Calculation, Expression, Measure
+from confab.reasoner.aggregates.totals import EnumeratedState
+from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, Number, done, inside, number, written
 from confab.reasoner.derivation import circular, strata
 from confab.reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph, text
 from confab.reasoner.limits import check
@@ -72,9 +74,9 @@ class Affordance:
     arguments : tuple of str
         The arguments of the behaviour, including the object.
     situation : tuple of Fact
-        The facts that satisfy the positive value conditions among the preconditions.
+        The facts that satisfy positive value conditions among the preconditions, and the amounts that preconditions compare.
     effect : tuple of Fact
-        The facts that hold after the behaviour.
+        The values and amounts that the behaviour's effects give.
     """
 
     object: str
@@ -84,25 +86,25 @@ class Affordance:
     effect: tuple[Fact, ...]
 
 
-def write_situation(graph: KnowledgeGraph, reading: Reading, state: State | None = None) -> None:
-    """Write a state (by default the initial state) and its derived facts into the graph `SITUATION`."""
+def write_situation(graph: KnowledgeGraph, reading: Reading, state: State | None = None) -> dict[Symbol, str]:
+    """Write a state (by default the initial state) and its derived facts into the graph `SITUATION`, and return them."""
     name, properties = ox.NamedNode(SITUATION), value_properties(graph)
     graph.store.clear_graph(name)
-    count = 0
+    written_facts: dict[Symbol, str] = {}
 
     def write(symbol: Symbol, value: str) -> None:
-        nonlocal count
-        count += 1
-        if not count % 4096:
+        written_facts[symbol] = value
+        if not len(written_facts) % 4096:
             check("writing the situation")
         prop = properties.get(reading.names.iri(symbol.situation))
-        for triple in said(reading, Fact(symbol, value), prop, ox.BlankNode(f"fact{count}")):
+        for triple in said(reading, Fact(symbol, value), prop, ox.BlankNode(f"fact{len(written_facts)}")):
             graph.store.add(ox.Quad(triple.subject, triple.predicate, triple.object, name))
 
     for symbol, value in (state or reading.problem.initial).items():
         write(symbol, value)
     for symbol in _following(graph, reading) if reading.problem.domain.rules else ():
         write(symbol, TRUE)
+    return written_facts
 
 
 def _following(graph: KnowledgeGraph, reading: Reading) -> Iterator[Symbol]:
@@ -162,14 +164,18 @@ def affordances(graph: KnowledgeGraph, reading: Reading, state: State | None = N
     bread2 EAT bread2 REST_OF_FOOD eaten
     cup1 CLEAR_AWAY cup1 PLACE counter_right
     """
-    write_situation(graph, reading, state)
+    problem, now = reading.problem, write_situation(graph, reading, state)
+    world = EnumeratedState(problem.classes, problem.relations, now, problem.domain.situations)
     writer = _PatternWriter(graph, reading)
+    authored = problem.domain.authored
     found = []
-    for behavior in reading.problem.domain.behaviors.values():
+    for behavior in problem.domain.behaviors.values():
         for bindings in writer.rows(behavior):
             arguments = tuple(bindings[parameter.name] for parameter in behavior.parameters)
-            situation = tuple(sorted(_facts(behavior.preconditions, bindings)))
-            effect = tuple(sorted(writer.effects(behavior, arguments, bindings)))
+            situation = tuple(sorted({*_facts(behavior.asked, bindings, world)}))
+            effect = tuple(
+                sorted(fact for fact in _effect(behavior, bindings, world) if fact.symbol.situation in authored)
+            )
             about = {fact.symbol.arguments[0] for fact in (*situation, *effect)}
             objects = [o for o in dict.fromkeys(arguments) if o in about]
             found += [Affordance(o, behavior.name, arguments, situation, effect) for o in objects]
@@ -180,16 +186,41 @@ def _pairs(graph: KnowledgeGraph, query: str) -> Iterator[tuple[str, str]]:
     return ((text(one), text(other)) for one, other in graph.select(query, SCENE))
 
 
-def _facts(conditions: Sequence[Condition], bindings: dict[str, str]) -> Iterator[Fact]:
-    """Yield the facts that satisfy positive value conditions for the given variable bindings."""
+def _facts(conditions: Sequence[Condition], bindings: Mapping[str, str], world: EnumeratedState) -> Iterator[Fact]:
+    """Yield the facts of positive value conditions, and the amounts that comparisons name, for the given variable bindings."""
     for condition in conditions:
         if isinstance(condition, ValueCondition) and not condition.negated:
-            yield _fact(condition, bindings)
+            yield Fact(_symbol(condition, bindings), bindings.get(condition.value, condition.value))
+        elif isinstance(condition, Comparison):
+            for part in (*inside(condition.left), *inside(condition.right)):
+                if isinstance(part, Amount):
+                    symbol = _symbol(part, bindings)
+                    amount = world.value(symbol.situation, symbol.arguments)
+                    if amount is not None:
+                        yield Fact(symbol, amount)
 
 
-def _fact(said: ValueCondition | ValueEffect, bindings: dict[str, str]) -> Fact:
-    arguments = tuple(bindings.get(argument, argument) for argument in said.arguments)
-    return Fact(Symbol(said.situation, arguments), bindings.get(said.value, said.value))
+def _effect(behavior: Behavior, bindings: Mapping[str, str], world: EnumeratedState) -> Iterator[Fact]:
+    """Yield the facts that the effects of a behaviour give, including conditional effects whose conditions hold."""
+    values: dict[Symbol, str] = {}
+    amounts: dict[Symbol, Number] = {}
+    for effect in behavior.every_effect:
+        for terms in world.solutions(effect.when, dict(bindings), behavior.kinds, ()):
+            symbol = _symbol(effect, terms)
+            before = world.value(symbol.situation, symbol.arguments)
+            if before is None:
+                continue  # the effect doesn't change a symbol that doesn't exist
+            if isinstance(effect, ValueEffect):
+                values[symbol] = terms.get(effect.value, effect.value)
+            else:
+                old = amounts.get(symbol, number(before))
+                amounts[symbol] = done(effect.operation, old, world.worth(effect.amount, terms))
+    values |= {symbol: written(amount) for symbol, amount in amounts.items() if isinstance(amount, Fraction)}
+    yield from (Fact(symbol, value) for symbol, value in values.items())
+
+
+def _symbol(said: ValueCondition | ValueEffect | AmountEffect | Amount, bindings: Mapping[str, str]) -> Symbol:
+    return Symbol(said.situation, tuple(bindings.get(argument, argument) for argument in said.arguments))
 
 
 def allowed_together(behavior: Behavior, situations: Mapping[str, SituationType]) -> Iterator[Condition]:
@@ -252,16 +283,6 @@ class _PatternWriter:
         names = self.names(behavior, when)
         for row in self.graph.select(self.query(behavior, when, ordered=False), SCENE):
             yield {name: self.reading.names.short(text(term)) for name, term in zip(names, row, strict=True)}
-
-    def effects(self, behavior: Behavior, arguments: tuple[str, ...], bindings: dict[str, str]) -> Iterator[Fact]:
-        """Yield the facts of a behaviour's effects, including conditional effects whose conditions hold."""
-        for effect in behavior.effects:
-            if not effect.when:
-                yield _fact(effect, bindings)
-                continue
-            for row in self.rows(behavior, effect.when):
-                if tuple(row[parameter.name] for parameter in behavior.parameters) == arguments:
-                    yield _fact(effect, row)
 
     def names(self, behavior: Behavior, when: Sequence[Condition]) -> list[str]:
         """Return the variables that a query binds: the parameters in order, then the variables determined by value conditions."""

@@ -64,7 +64,7 @@ def facts_of(
     for symbol in stated:
         if symbol.situation not in domain.situations:
             raise KnowledgeError(f"the situation type of the fact {symbol} is unknown")
-        if symbol.situation in domain.aggregates:
+        if symbol.situation in domain.rules or symbol.situation in domain.aggregates:
             raise KnowledgeError(
                 f"{symbol} is stated, but a rule defines it; drop the fact, or the rule of {symbol.situation}",
                 names.iri(symbol.arguments[0]) if symbol.arguments[0] in names else "",

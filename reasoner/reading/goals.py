@@ -76,10 +76,11 @@ def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
     """
     words = fact.split()
     individuals, known = problem.individuals, problem.domain.situations
+    authored = [name for name in known if name in problem.domain.authored]
     about, name, *rest = words if len(words) > 1 else ("", "")
     if name not in known and (len(words) < 3 or about not in individuals):
         example = next((f", e.g. '{Fact(*one)}'" for one in chain(problem.goal.items(), problem.initial.items())), "")
-        meant = _with_situation(problem, words) or (nearest(name, known) if len(words) > 2 else "")
+        meant = _with_situation(problem, words) or (nearest(name, authored) if len(words) > 2 else "")
         wanted = f"wanted 'object SITUATION value'{example}{_not_one_fact(words) or meant}"
         raise KnowledgeError(f"'{fact}' is no fact; {wanted}")
     if about not in individuals:
@@ -91,9 +92,9 @@ def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
         hint = (
             f"; it is the value property of {meant}"
             if meant
-            else nearest(name, known) or _with_situation(problem, words)
+            else nearest(name, authored) or _with_situation(problem, words)
         )
-        raise KnowledgeError(f"unknown situation type '{name}' in '{fact}'{hint} (known: {', '.join(known)})")
+        raise KnowledgeError(f"unknown situation type '{name}' in '{fact}'{hint} (known: {', '.join(authored)})")
     situation = known[name]
     if situation.boolean and len(rest) == len(situation.arguments) - 1:
         rest.append(TRUE)

@@ -4,8 +4,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 import confab
+from confab import ontology
+from confab.cli import app
 from confab.page.sheet import Sheet
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.possible import impossible
@@ -121,3 +124,30 @@ def test_a_derived_fact_is_refused_by_interventions_as_by_with_fact() -> None:
         scene.execute(interventions=["after=1 cart LOAD 5"])
     with pytest.raises(KnowledgeError, match="a rule defines LOAD; change a fact"):
         scene.with_fact("cart LOAD 5")
+
+
+@pytest.mark.parametrize("fact", ["bay1 CLASH true", "bay1 CLASH false"])
+def test_a_fact_that_a_rule_defines_is_refused_at_every_door(tmp_path: Path, fact: str) -> None:
+    scene = confab.load("drums-small")
+    message = "a rule defines CLASH; change a fact that it follows from"
+    with pytest.raises(KnowledgeError, match=message):
+        scene.with_fact(fact)
+    with pytest.raises(KnowledgeError, match=message):
+        scene.execute(interventions=[f"after=1 {fact}"])
+    run = CliRunner().invoke(app, ["execute", "drums-small", "--intervene", f"after=1 {fact}"])
+    assert message in str(run.exception)
+    about, name, value = fact.split()
+    sheet = Sheet(scene)
+    sheet.symbols[f"{about} {name}"] = Symbol(name, (about,))
+    with pytest.raises(KnowledgeError, match=message):
+        sheet.turned({"facts": {f"{about} {name}": value}})
+    file = tmp_path / "stated.ttl"
+    text = ontology.scenes()["drums-small"].read_text(encoding="utf-8")
+    file.write_text(f"{text}\n:stated a c:SituatedObjectInstance ; c:situationType d:{name} ; c:about :{about} .\n")
+    with pytest.raises(KnowledgeError, match="CLASH> is stated, but a rule defines it"):
+        confab.load(file).plan()
+
+
+def test_an_error_lists_only_situation_types_of_the_author() -> None:
+    with pytest.raises(KnowledgeError, match=r"\(known: AT, CLASH, IN, RESERVE\)"):
+        confab.load("drums-small").with_fact("bay1 CLSH true")

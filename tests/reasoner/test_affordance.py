@@ -68,6 +68,22 @@ def test_an_affordance_is_object_situation_behaviour_and_effect() -> None:
     assert [str(fact) for fact in found.effect] == ["cup1 PLACE counter_right"]
 
 
+def test_an_affordance_has_the_amounts_that_a_behaviour_compares_and_changes() -> None:
+    graph, reading = scene("canteen-small")
+    found = {(a.behavior, *a.arguments): a for a in affordances(graph, reading)}
+    refill, drive = found["L1_REFILL", "jug1"], found["L2_DRIVE", "trolley", "tap"]
+    assert [str(fact) for fact in (*refill.situation, *refill.effect)] == ["jug1 SERVINGS 1.5", "jug1 SERVINGS 2"]
+    assert [str(fact) for fact in drive.situation] == ["trolley BATTERY 6", "trolley TROLLEY_AT dock"]
+    assert [str(fact) for fact in drive.effect] == ["trolley BATTERY 4", "trolley TROLLEY_AT tap"]
+
+
+def test_the_effects_of_an_affordance_are_of_situation_types_of_the_author() -> None:
+    graph, reading = scene("tour-small")
+    effects = {str(fact) for found in affordances(graph, reading) for fact in found.effect}
+    assert "bridge SEEN true" in effects
+    assert not [fact for fact in effects if "." in fact]
+
+
 def states(reading: Reading, level: int) -> list[State]:
     """Return some states that behaviours of a level reach."""
     model = Model(reading.problem)
