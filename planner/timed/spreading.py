@@ -38,7 +38,7 @@ def spread(problem: Problem, plan: Plan) -> Plan:
     used = {value for state in (problem.initial, problem.goal) for value in state.values()}
     used |= {one for symbol in (*problem.initial, *problem.goal) for one in symbol.arguments}
     kinds = {one: {kind for kind, its in problem.classes.items() if one in its} for one in naming}
-    looked = {one.value: one.turns for one in order.resources if one.value is not None}
+    looked = {one.value: one.turns for one in order.resources if one.value is not None and one.value in naming}
     spans: dict[str, list[tuple[int, int, list[int]]]] = defaultdict(list)
     for value, turns in looked.items():
         last = -1
