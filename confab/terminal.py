@@ -12,7 +12,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from io import TextIOWrapper
+from io import TextIOWrapper, UnsupportedOperation
 from pathlib import Path
 from threading import Timer, current_thread, main_thread
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -168,7 +168,8 @@ def _open_streams() -> None:
     """
     for stream in (sys.stdin, sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
-            stream.reconfigure(encoding="utf-8", errors="surrogateescape")
+            with suppress(UnsupportedOperation):  # a stream that was read before keeps its encoding
+                stream.reconfigure(encoding="utf-8", errors="surrogateescape")
     closed = [stream for stream in (0, 1, 2) if not _is_open(stream)]
     for _ in closed:
         os.open(os.devnull, os.O_RDWR)  # the device gets the lowest free file descriptor

@@ -193,8 +193,8 @@ class MeasuredDuration:
     def of(cls, seconds: Sequence[float]) -> MeasuredDuration:
         """Return the statistics of one or more durations.
 
-        >>> Measured.of([1.0, 2.0, 3.0])
-        Measured(count=3, mean=2.0, spread=1.0)
+        >>> MeasuredDuration.of([1.0, 2.0, 3.0])
+        MeasuredDuration(count=3, mean=2.0, spread=1.0)
         """
         mean = sum(seconds) / len(seconds)
         squares = sum((one - mean) ** 2 for one in seconds)
@@ -203,7 +203,7 @@ class MeasuredDuration:
     def __add__(self, other: MeasuredDuration) -> MeasuredDuration:
         """Return the joint statistics of two disjoint sets of executions.
 
-        >>> Measured.of([1.0]) + Measured.of([2.0, 3.0]) == Measured.of([1.0, 2.0, 3.0])
+        >>> MeasuredDuration.of([1.0]) + MeasuredDuration.of([2.0, 3.0]) == MeasuredDuration.of([1.0, 2.0, 3.0])
         True
         """
         count, apart = self.count + other.count, other.mean - self.mean

@@ -466,7 +466,7 @@ def _namesakes(graph: KnowledgeGraph, schema: OntologySchema, members: Sequence[
     rows = graph.select(
         f"SELECT ?x ?named WHERE {{ VALUES ?x {{ {values_of(candidates)} }} BIND(EXISTS {{ ?x a owl:NamedIndividual, ?kind "
         "FILTER(isIRI(?kind) && !STRSTARTS(STR(?kind), STR(owl:))) } AS ?named) "
-        "FILTER(?named || EXISTS { ?member a ?x, owl:NamedIndividual }) }",
+        "FILTER(?named || EXISTS { ?member a ?x FILTER EXISTS { ?member a owl:NamedIndividual } }) }",
         SCENE,
     )
     found = {text(x) for x, _ in rows}
