@@ -26,7 +26,7 @@ def relevant(space: Workspace, level: int, off: Mapping[Cell, str], depth: int) 
     """Yield the distinct applicable behaviours of a level that start a chain of at most `depth` steps to a value in `off`."""
     given: set[Ground] = set()
     for cell, value in off.items():
-        for length, ground in chains(space, level, cell, value):
+        for length, ground in relevant_achievers(space, level, cell, value):
             if length > depth:
                 break
             if ground is not None and ground not in given:
@@ -34,7 +34,7 @@ def relevant(space: Workspace, level: int, off: Mapping[Cell, str], depth: int) 
                 yield ground
 
 
-def chains(
+def relevant_achievers(
     space: Workspace,
     level: int,
     cell: Cell,

@@ -19,7 +19,7 @@ from dataclasses import replace
 from itertools import product
 from typing import TYPE_CHECKING
 
-from confab.planner.hierarchical.relevance import chains
+from confab.planner.hierarchical.relevance import relevant_achievers
 from confab.planner.hierarchical.search_budget import SearchBudget
 from confab.planner.hierarchical.workspace import Ground, Keep, Workspace
 from confab.planner.plan import Counts, Limits, Reason, Status, UngroundableError
@@ -123,7 +123,7 @@ def focus(space: Workspace, level: int, targets: Mapping[Cell, str], budget: Sea
     for cell, value in targets.items():
         met.update(dict.fromkeys((*arguments_of(cell[1]), value)))
     for cell, value in targets.items():
-        for _ in chains(space, level, cell, value, budget.questions, met):
+        for _ in relevant_achievers(space, level, cell, value, budget.questions, met):
             pass
     for members in program.problem.classes.values():
         if len(members) <= FEW:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 
 from confab.planner.hierarchical.call import Call
-from confab.planner.hierarchical.relevance import Asked, chains
+from confab.planner.hierarchical.relevance import Asked, relevant_achievers
 from confab.planner.plan import Limits, Reason
 from confab.planner.transitions import Cell, arguments_of
 from confab.reasoner.amounts import bounds_written
@@ -52,7 +52,7 @@ def missing_amounts(call: Call) -> Iterator[str]:
     for (cell, value), level in [(goal, level) for goal in list(call.aim.items())[:1] for level in call.program.levels]:
         asked: Asked = set()
         with suppress(LimitError):
-            for _ in chains(space, level, cell, value, QUESTIONS, asked=asked):
+            for _ in relevant_achievers(space, level, cell, value, QUESTIONS, asked=asked):
                 pass
         told.update(
             {
