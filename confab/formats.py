@@ -50,8 +50,8 @@ class BrokenJson(TypedDict):
 
 
 LeftJson = TypedDict("LeftJson", {"level": int, "from": list[int], "to": list[int], "breaks": list[BrokenJson]})
-"""A part of a plan, between two paths, in which the steps of one level are missing. `breaks` has the conditions of this level that
-the part violates.
+"""A part of a plan without steps of one level, from the step at one path to the step at another. `breaks` has the conditions of
+this level that the part violates.
 """
 
 

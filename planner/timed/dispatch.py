@@ -118,7 +118,7 @@ class Dispatch:
         self.begun[number] = self._units(now)
 
     def end(self, number: int, now: Fraction) -> None:
-        """Report that a primitive ends; actors' turns that haven't begun may be exchanged."""
+        """Report the end of a primitive; at an unexpected end, actors' turns that haven't begun may be exchanged."""
         time = self.over[number] = self._units(now)
         if self.controlled and time - self.begun[number] != self.lasts[number]:
             self._exchange(time)

@@ -168,7 +168,7 @@ class Listing:
             yield dict(zip(turns, its, strict=True))
 
     def tried(self, block: Sequence[int]) -> _Appended | int:
-        """Return a block as it ends first, or a resource that isn't free for the block."""
+        """Return a block with the actors with which it ends earliest, or a resource that isn't free."""
         best: _Appended | None = None
         occupied = -1
         for taking in self.crews(block):
