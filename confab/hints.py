@@ -20,7 +20,7 @@ MODULE = {
     "confab.scenes()": "list_scenes list_examples available_scenes datasets samples examples catalog list all_scenes "
     "registry ls builtin shipped names list_domains domains problems get_scenes scene_names",
     "confab.load(SCENE).plan()": "plan solve search find_plan Planner OneshotPlanner get_plan make_plan run_planner "
-    "planning SequentialPlanner AnytimePlanner astar bfs Solver solver Plan SequentialPlan policy Search heuristic "
+    "planning SequentialPlanner AnytimePlanner astar bfs Solver solver policy Search heuristic "
     "TaskPlanner plan_scene compute_plan solve_problem replan Replanner Step Steps Result PlanResult TaskNetwork "
     "PlannerMode PlanGenerationResult PlanningEngine get_planner",
     "confab.load(SCENE).query(TEXT)": "query ask sparql select SparqlQuery run_query execute_query question "
@@ -43,6 +43,7 @@ MODULE = {
     "create_scene Action Behavior Behaviour Fluent Object Type Skill Predicate Operator InstantaneousAction "
     "DurativeAction define UserType add_action Situation build Pose Location Place Cup Bottle ObjectType Hand "
     "Gripper Class ObjectProperty Thing",
+    "confab.load(SCENE).plan().plan, or confab.load(SCENE).read_plan(FILE)": "Plan SequentialPlan",
     "confab.load(SCENE).read_plan(FILE)": "load_plan read_plan parse_plan open_plan plan_from_file from_plan",
     "confab.load(SCENE).read_episode(FILE)": "load_episode read_episode load_execution open_episode",
     "confab.load(SCENE).read_report(FILE, PLAN)": "load_report read_report load_verdicts load_verification",
@@ -93,10 +94,12 @@ SCENE = {
     "query": "ask sparql select sparql_query execute_query run_query search_one rows fetch question queries "
     "get_results",
     "with_fact": "add_fact set_fact set add assert_fact update change tell put set_value set_initial_value "
-    "remove_fact retract insert assume modify set_init set_state assign replace with_facts "
-    "set_property edit add_facts set_initial del_fact update_fact add_init observe_fact set_initial_state move "
+    "insert assume modify set_init set_state assign replace with_facts "
+    "set_property edit add_facts set_initial update_fact add_init observe_fact set_initial_state move "
     "fluent_value with_init without patch apply_fact set_location place_object put_on move_to set_position teleport "
     "put_object move_object",
+    "with_fact(FACT), which states another value, or false": "remove_fact retract del_fact delete_fact without_fact "
+    "without_facts clear_fact remove_facts delete_facts",
     "with_goal": "set_goal add_goal with_goals set_goals replace_goal add_goals remove_goal change_goal set_task "
     "set_objective clear_goals delete_goal del_goal update_goal new_goal add_task reset_goals set_target new_task want "
     "achieve_goal",
@@ -106,10 +109,11 @@ SCENE = {
     "create_object add_node add_edge "
     "add_objects add_class add_behavior add_action spawn add_fluent add_statement add_rule add_axiom "
     "add_constraint add_location add_robot add_type add_property parse_into extend",
+    "plan().plan.to_networkx(), or graph": "to_networkx nodes edges networkx",
     "graph": "named_graphs "
     "triples to_yaml yaml rdf to_rdf to_graph rdflib as_graph to_ttl to_turtle "
     "subjects predicates_of to_json json to_dict to_json_ld turtle ttl "
-    "value_of triples_of statements quads to_networkx nodes edges networkx to_string "
+    "value_of triples_of statements quads to_string "
     "n3 as_dict subject_objects predicate_objects knowledge_graph axioms "
     "neighbors neighbours labels comments annotations to_owl_xml dataset namespaces_graph "
     "property_values",
@@ -653,7 +657,8 @@ OPTIONS = {
     "memory": "experience knowledge model learned mem use_memory memory_file with_memory checkpoint weights "
     "learned_from use",
     "no_memory": "without_memory no_learning fresh memoryless",
-    "engine": "planner solver backend heuristic search_engine up_engine planner_name fast_downward external "
+    "mode engine": "planner",
+    "engine": "solver backend heuristic search_engine up_engine planner_name fast_downward external "
     "algorithm search use",
     "mode": "strategy algorithm alias method search_mode policy config variant heuristic search",
     "optimal minimise": "optimise optimize best shortest cost_optimal anytime optimality minimum_cost cheapest "
