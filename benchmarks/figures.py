@@ -2,6 +2,8 @@
 
     <!-- figures NAME: COMMAND; commit ABC1234; 2026-01-31; measures PATH PATH; table 2; quick -->
     …
+    <small>Commit ABC1234, 2026-01-31</small>
+
     <!-- end -->
 
     python -m benchmarks.figures            list the blocks that are older than the code that they measure
@@ -9,8 +11,9 @@
     python -m benchmarks.figures all        update all blocks, which takes hours (`make bench`)
     python -m benchmarks.figures NAME …     update the named blocks
 
-A block contains the output of its command, or the table of the stated number in the output. Several blocks may share a command,
-which is then run once. A block marked `prose` was edited by hand. The new figures of a `prose` block are written to
+A block contains the output of its command, or the table of the stated number in the output. The last line of a block shows the
+commit and the date of the header in small print, because readers of the site don't see the header. Several blocks may share a
+command, which is then run once. A block marked `prose` was edited by hand. The new figures of a `prose` block are written to
 confab-out/figures/NAME.md, for another edit by hand.
 """
 
@@ -56,6 +59,16 @@ class Block:
         return next((found[1] for field in self.fields[1:] if (found := COMMIT.fullmatch(field))), "")
 
     @property
+    def date(self) -> str:
+        """The day of the measurement."""
+        return next((field for field in self.fields[1:] if DATE.fullmatch(field)), "")
+
+    @property
+    def small_print(self) -> str:
+        """The last line of the block, which shows readers the commit and the date."""
+        return f"<small>Commit {self.commit}, {self.date}</small>"
+
+    @property
     def measures(self) -> list[str]:
         """The paths of the code that is measured."""
         return next((field.split()[1:] for field in self.fields[1:] if field.startswith("measures ")), [])
@@ -71,7 +84,7 @@ class Block:
             yield f"{self}: no command, but '{self.fields[0]}'; wanted one with 'python -m …' first"
         if not self.commit:
             yield f"{self}: no commit; wanted '; commit ABC1234'"
-        if not any(DATE.fullmatch(field) for field in self.fields):
+        if not self.date:
             yield f"{self}: no date; wanted '; 2026-01-31'"
         if not self.measures:
             yield f"{self}: nothing that it measures; wanted '; measures PATH …'"
@@ -151,7 +164,8 @@ def write(wanted: Sequence[Block]) -> int:
                 print(f"{block}: to be edited by hand, from {(ASIDE / block.name).relative_to(ROOT)}.md", flush=True)
             else:
                 header = DATE.sub(str(date.today()), COMMIT.sub(f"commit {block.last(ROOT)}", block.header))
-                new = f"<!-- figures {block.name}: {header} -->\n\n{figures}\n\n<!-- end -->"
+                small_print = Block(block.page, block.name, header).small_print
+                new = f"<!-- figures {block.name}: {header} -->\n\n{figures}\n\n{small_print}\n\n<!-- end -->"
                 old = block.page.read_text("utf-8")
                 this = next(m[0] for m in BLOCK.finditer(old) if m["name"] == block.name)
                 block.page.write_text(old.replace(this, new), "utf-8")

@@ -45,6 +45,13 @@ def test_every_block_of_figures_states_its_command_commit_and_date_and_stale_blo
         )
 
 
+def test_readers_see_the_commit_and_the_date_of_every_block_of_figures() -> None:
+    for path in [figures.ROOT / "README.md", *sorted((figures.ROOT / "docs").rglob("*.md"))]:
+        for found in figures.BLOCK.finditer(path.read_text("utf-8")):
+            block = figures.Block(path, found["name"], found["header"])
+            assert found["text"].rstrip().endswith("\n\n" + block.small_print), block
+
+
 def test_every_block_of_figures_ends_before_the_next_one_begins() -> None:
     for path in [figures.ROOT / "README.md", *sorted((figures.ROOT / "docs").rglob("*.md"))]:
         text = path.read_text("utf-8")

@@ -1,14 +1,14 @@
 """Learned experience: rules, orders of goals and methods, with tallies of their use.
 
-==========  ===================================================================================================
-Rule        a behaviour that achieves a kind of goal under some conditions
-Order       a kind of goal that is achieved before another kind, if two such goals share individuals
-Method      steps that refine a behaviour, with roles as arguments
-GoalKind    the goals of one situation type about individuals of one class
-Tally       numbers of times that an item was chosen successfully, was passed over, and failed
-Measured    durations of a behaviour: number of executions, mean and spread
-Experience  all learned items, with grow-only tallies by replica and epoch, which can be merged
-==========  ===================================================================================================
+================  ===================================================================================================
+LearnedRule       a behaviour that achieves a kind of goal under some conditions
+LearnedOrder      a kind of goal that is achieved before another kind, if two such goals share individuals
+Method            steps that refine a behaviour, with roles as arguments
+GoalKind          the goals of one situation type about individuals of one class
+Tally             numbers of times that an item was chosen successfully, was passed over, and failed
+MeasuredDuration  durations of a behaviour: number of executions, mean and spread
+Experience        all learned items, with grow-only tallies by replica and epoch, which can be merged
+================  ===================================================================================================
 
 Rules, orders, methods and kinds of goals are named by a hash of their content. Equal items therefore have equal names in all
 replicas, and a union of replicas merges equal items. An item has one tally per `RoleFact`. The tally of the empty fact
