@@ -50,8 +50,8 @@ WEIGHT = 3
 """Weight of h_FF when the whole plan is searched again with all operators."""
 TRIALS = 2_000_000
 """Maximum number of replayed operators when superfluous steps are removed."""
-LOOK = 50
-"""Number of operators that are ranked in the time of one evaluation."""
+LOOK, BITS = 50, 400
+"""Number of operators that are ranked, and of bits that are renumbered, in the time in which one operator is examined."""
 
 
 def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None = None) -> list[int]:
@@ -73,6 +73,7 @@ def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None =
         prices = {operator: price.plus(Linear((), Fraction(TRIFLE))) for operator, price in task.prices.items()}
         task = replace(task, costs=[cost + TRIFLE for cost in task.costs], prices=prices)
     best = cheaper(task, plan, shortened(task, plan, deadline))
+    work -= len(plan) ** 2 // 2  # about the number of replayed operators
     if len(best) <= STEPS:
         best, proved = cheapest(task, best, work, deadline)
         if proved:
@@ -83,7 +84,9 @@ def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None =
         for size in SIZES:
             best = windows.pass_over(best, size)
             best = cheaper(task, best, windows.pass_over(regrouped(task, best), size))
-        best = cheaper(task, best, shortened(task, best, deadline))
+        if task.cost_of(best) < before:
+            best = cheaper(task, best, shortened(task, best, deadline))
+            windows.work -= len(best) ** 2 // 2
         if task.cost_of(best) == before or windows.over:
             return cheaper(task, windows.restarted(best), plan)
 
@@ -274,6 +277,7 @@ class _Windows:
         if (state, wanted, spent) in self.failed:
             return None
         operators = self.near(steps, state, wanted)
+        self.work -= len(operators) * self.task.size // BITS
         task, operators = self.part(operators, state, wanted)
         found = self.search(task, spent, self.most)
         return None if found is None else [operators[operator] for operator in found]
@@ -320,7 +324,6 @@ class _Windows:
         """
         task, far = self.task, 1000
         owners, _, _ = self.arrays
-        self.work -= len(owners) // LOOK
         at_first = self.flags(state & (1 << task.size) - 1)
         forward = np.full(len(owners), far)
         known = at_first.copy()
@@ -329,6 +332,7 @@ class _Windows:
             ready = (np.diff(sums[task.needs.starts]) == np.diff(task.needs.starts)) & (forward == far)
             if not ready.any():
                 break
+            self.work -= len(owners) // LOOK
             forward[ready] = depth
             known[task.adds.items[ready[self.arrays[2]]]] = True
         lost = 0
@@ -339,6 +343,7 @@ class _Windows:
         backward = np.full(len(owners), far)
         later = np.zeros(task.size, bool)
         for depth in range(len(steps)):
+            self.work -= len(owners) // LOOK
             sums = np.concatenate([[0], np.cumsum(target[task.adds.items])])
             helps = (np.diff(sums[task.adds.starts]) > 0) & (backward == far) & (forward < far)
             target |= later
