@@ -338,9 +338,11 @@ class Execution(metaclass=RightNames):
 
     @property
     def soft_goals(self) -> tuple[SoftGoal, ...]:
-        """The soft goals of the task, the heaviest first; a goal that an intervention or `goals` replaced isn't among them."""
+        """The soft goals of the task, the heaviest first, without goals that an intervention or `goals` dropped or replaced."""
         problem, episode = self.scene.problem, self.episode
-        soft = {s: v for s, v in problem.goal.items() if s in problem.weights and episode.goal.get(s, v) == v}
+        dropped = {intervention.symbol for intervention, _ in episode.interventions}
+        weighted = ((s, v) for s, v in problem.goal.items() if s in problem.weights and s not in dropped)
+        soft = {s: v for s, v in weighted if episode.goal.get(s, v) == v}
         unmet = {fact.symbol for fact in open_goals(replace(problem, initial=episode.observed, goal=soft))}
         found = [SoftGoal(Fact(s, value), problem.weights[s], s not in unmet) for s, value in soft.items()]
         return tuple(sorted(found, key=lambda one: (-one.weight, one.fact.symbol)))

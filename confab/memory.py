@@ -406,7 +406,7 @@ class Memory(metaclass=RightNames):
         return [
             *orders,
             *(
-                f"{text}: {counted(times, 'time')}{''.join(f'; {who}' for who in preferred(say, facts))}"
+                f"{text}: {counted(times, 'time')}{''.join(f'; {one}' for one in preferred(say, facts))}"
                 for times, text, facts in sorted(counted_, key=lambda row: (-row[0], row[1]))
             ),
         ]

@@ -161,7 +161,7 @@ def planned(task: PlanningTask) -> Found:
         problem, outcome = searched_without(task, problem, faulty)
     else:
         problem, outcome = searched(task, problem)
-    if part is not None and not stands(task, outcome):
+    if part is not None and needs_the_whole_scene(task, outcome):
         whole = task.whole()
         if whole != task.problem:
             part = None
@@ -174,12 +174,12 @@ def planned(task: PlanningTask) -> Found:
     return Found(problem, outcome, timed, part, task.options.strategy == "optimal")
 
 
-def stands(task: PlanningTask, outcome: Outcome) -> bool:
-    """Return whether an outcome for a part of the scene may hold in the whole scene: no proof, and no plan with faults there."""
+def needs_the_whole_scene(task: PlanningTask, outcome: Outcome) -> bool:
+    """Return whether the whole scene must be searched: its part has no plan, or the plan has faults in the whole scene."""
     if outcome.status is Status.UNSOLVABLE:
-        return False
+        return True
     plan, knowledge = outcome.plan, task.scene.knowledge
-    return not (plan and refused(knowledge, task.reading, plan, task.goals, outcome.unmet))
+    return bool(plan and refused(knowledge, task.reading, plan, task.goals, outcome.unmet))
 
 
 def searched_without(

@@ -7,11 +7,16 @@ that a part of a call can be limited to a share of the time.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from time import perf_counter
+from typing import TypeVar
+
+T = TypeVar("T")
+ROWS = 4096
+"""Number of rows after which `checked` checks the deadline."""
 
 
 class LimitError(Exception):
@@ -105,6 +110,14 @@ def overtime(share: float = 0.1) -> Iterator[Deadline]:
 def current() -> Deadline:
     """Return the current deadline."""
     return _current.get()
+
+
+def checked(rows: Iterable[T], doing: str) -> Iterator[T]:
+    """Yield the rows, and check the current deadline before every `ROWS` rows."""
+    for count, row in enumerate(rows):
+        if not count % ROWS:
+            check(doing)
+        yield row
 
 
 def check(doing: str, ahead: float = 0.0) -> None:

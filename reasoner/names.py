@@ -14,7 +14,7 @@ from inspect import getattr_static, signature
 from types import FunctionType
 from typing import TYPE_CHECKING, NoReturn, ParamSpec, TypeVar
 
-from confab.reasoner.limits import Deadline, check, within
+from confab.reasoner.limits import Deadline, checked, within
 
 C = TypeVar("C", bound=type)
 P = ParamSpec("P")
@@ -34,14 +34,10 @@ class Names:
 
     def __init__(self, iris: Iterable[str]) -> None:
         by_local = defaultdict(list)
-        for count, iri in enumerate(set(iris)):
-            if not count % 4096:
-                check("reading the scene")
+        for iri in checked(set(iris), "reading the scene"):
             by_local[local_name(iri)].append(iri)
         self._iris: dict[str, str] = {}
-        for count, (local, group) in enumerate(by_local.items()):
-            if not count % 4096:
-                check("reading the scene")
+        for local, group in checked(by_local.items(), "reading the scene"):
             for iri in sorted(group):
                 name = local if len(group) == 1 else f"{_ontology_name(iri)}:{local}"
                 self._iris[name if name not in self._iris else iri] = iri

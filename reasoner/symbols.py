@@ -95,7 +95,8 @@ class SituationType:
 
     `level` is the first level on which the symbols exist. `rest` is the value that a refinement must restore. `default` is the
     initial value of a symbol for which the scene states no value. `perceived` states how the values are perceived in physics; it is
-    None for values that aren't perceived. `properties` are the names of the value properties.
+    None for values that aren't perceived. `properties` are the names of the value properties. `added` states whether Confab added
+    the situation type to express a condition about earlier states.
     """
 
     name: str
@@ -108,6 +109,7 @@ class SituationType:
     quantity: Quantity | None = None
     perceived: Perceived | None = None
     properties: tuple[str, ...] = field(default=(), compare=False)
+    added: bool = field(default=False, compare=False)
 
 
 # ---------------------------------------------------------------------------------------------------------- conditions
@@ -547,9 +549,10 @@ class Domain:
 
     @cached_property
     def authored(self) -> frozenset[str]:
-        """The situation types of the author; the names of added situation types extend such a name by a dot and further text."""
-        names = self.situations.keys()
-        return frozenset(name for name in names if not any(name[:i] in names for i, c in enumerate(name) if c == "."))
+        """The situation types of the ontology's author, without the situation types that Confab adds."""
+        return frozenset(
+            name for name, one in self.situations.items() if not one.added and name not in self.constraints
+        )
 
     @property
     def levels(self) -> tuple[int, ...]:

@@ -36,6 +36,8 @@ def as_planned(problem: Problem, episode: Episode) -> Iterator[tuple[Problem, Pl
     for step in episode.done.steps:
         done = {(low.path, low.behavior, low.arguments) for low in Plan((step,)).primitives}
         events = [e for e in episode.events if (e.step.path, e.step.behavior, e.step.arguments) in done]
+        if not events:
+            continue  # nothing was observed
         before = situation(episode.initial, episode.course, events[0].begin)
         here = replace(problem, initial=before, goal={})
         alone = events[0].begin >= ended  # otherwise, nothing was observed between the earlier steps and this step
@@ -54,7 +56,9 @@ def after(problem: Problem, plan: Plan, state: State) -> dict[Symbol, str]:
     """Return the state after a valid plan."""
     now = dict(state)
     for step in plan.primitives:
-        now = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, now) or {}
+        following = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, now)
+        assert following is not None, "the plan checker has accepted the plan"
+        now = following
     return now
 
 

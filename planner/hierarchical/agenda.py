@@ -61,9 +61,10 @@ class Agenda:
     _before: Mapping[Cell, Sequence[Cell]] = field(default_factory=dict)
     _tried: dict[int, int] = field(default_factory=dict)
     _restarted: bool = False
+    proofs: Proofs = field(init=False)
 
     def __post_init__(self) -> None:
-        """Attach the proofs to the searches, unless the agenda is a trial."""
+        """Prepare the attempts to prove that there is no plan; a trial makes none."""
         self.proofs = Proofs(self.call, wanted=not self.trial)
 
     # ------------------------------------------------------------------------------------------------- one goal after another

@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
+from itertools import pairwise
 from math import inf
 from random import Random
 from time import perf_counter
@@ -128,11 +129,12 @@ def restores(call: Call) -> bool:
             if situations[situation].level > step.level:
                 values.setdefault((situation, key), []).append(old)
         for (situation, key), found in values.items():
-            found.append(table.now[situation][key])
-            if last.get((situation, key)) == (found[1], found[0]) != (found[0], found[1]):
+            changes = [(old, new) for old, new in pairwise((*found, table.now[situation][key])) if old != new]
+            if changes and last.get((situation, key)) == changes[0][::-1]:
                 table.undo(0)
                 return True
-            last[situation, key] = (found[-2], found[-1])
+            if changes:
+                last[situation, key] = changes[-1]
     table.undo(0)
     return False
 

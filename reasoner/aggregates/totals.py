@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from fractions import Fraction
 from itertools import product
 
@@ -71,12 +70,9 @@ def exceptions(
     """Return the number of violations of each constraint in a state; for a violated constraint, for each row of individuals."""
     found: dict[Symbol, str] = {}
     for name in domain.constraints:
-        rule = domain.aggregates[name]
-        count = totals(rule, classes, relations, state, domain.situations)
-        if count != {Symbol(name, ()): "0"}:
-            by_row = replace(rule, parameters=rule.variables, variables=())
-            count = totals(by_row, classes, relations, state, domain.situations)
-        found |= count
+        numbers = worths(domain.aggregates[name], EnumeratedState(classes, relations, state, domain.situations))
+        violations = {Symbol(name, row): written(number) for row, number in sorted(numbers.items())}
+        found |= violations or {Symbol(name, ()): "0"}
     return found
 
 
@@ -93,18 +89,22 @@ def totals(
     situations: Mapping[str, SituationType],
 ) -> dict[Symbol, str]:
     """Return the values of a sum or count for all of its arguments in a state, as texts of exact numbers."""
-    world = EnumeratedState(classes, relations, state, situations)
     kinds = [classes.get(p.kind, ()) for p in aggregate.parameters]
     found = {row: Fraction(0) for row in product(*kinds)}
-    solutions = set[tuple[str, ...]]()
+    for row, worth in worths(aggregate, EnumeratedState(classes, relations, state, situations)).items():
+        found[row[: len(kinds)]] += worth
+    return {Symbol(aggregate.situation, row): written(total) for row, total in found.items()}
+
+
+def worths(aggregate: Aggregate, world: EnumeratedState) -> dict[tuple[str, ...], Fraction]:
+    """Return the number that each solution of an aggregate's conditions contributes; a solution is a row of individuals."""
+    found: dict[tuple[str, ...], Fraction] = {}
     names = tuple(aggregate.kinds)
     for terms in world.solutions(aggregate.conditions, {}, aggregate.kinds, names):
-        row = tuple(terms[name] for name in names)
-        number = world.worth(aggregate.amount, terms)
-        if row not in solutions and isinstance(number, Fraction):
-            solutions.add(row)
-            found[row[: len(kinds)]] += number
-    return {Symbol(aggregate.situation, row): written(number) for row, number in found.items()}
+        row, number = tuple(terms[name] for name in names), world.worth(aggregate.amount, terms)
+        if row not in found and isinstance(number, Fraction):
+            found[row] = number
+    return found
 
 
 class EnumeratedState:

@@ -22,7 +22,7 @@ import pyoxigraph as ox
 
 from confab import ontology
 from confab.reasoner.graph.documents import DocumentError, document
-from confab.reasoner.limits import check
+from confab.reasoner.limits import check, checked
 from confab.reasoner.names import brief, nearest
 from confab.reasoner.vocabulary import CORE, OWL, PREFIXES, TYPE
 
@@ -140,12 +140,8 @@ class KnowledgeGraph:
         KnowledgeError
             The query isn't SPARQL; the message states line and column.
         """
-        rows: list[Row] = []
-        for row in self.solutions(query, graphs, **bindings):
-            rows.append(tuple(row))
-            if not len(rows) % 4096:
-                check("querying the knowledge graph")
-        return rows
+        rows = self.solutions(query, graphs, **bindings)
+        return [tuple(row) for row in checked(rows, "querying the knowledge graph")]
 
     def solutions(self, query: str, graphs: Sequence[str] = GRAPHS, **bindings: str) -> ox.QuerySolutions:
         """Return an iterator over the rows of a SELECT query, with the same errors as `select` and less memory."""

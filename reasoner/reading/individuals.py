@@ -10,7 +10,7 @@ import pyoxigraph as ox
 
 from confab.reasoner.condition_nodes import NodeValues
 from confab.reasoner.graph.knowledge import SCENE, KnowledgeGraph, text
-from confab.reasoner.limits import check
+from confab.reasoner.limits import checked
 from confab.reasoner.reading.frame import Frame
 from confab.reasoner.reading.rows import FIRST_INDEX_OF_NONE, Member, OntologySchema, Triple, index_of, link, stated
 from confab.reasoner.reading.swrl import SWRL
@@ -71,9 +71,7 @@ class Individuals:
         rows = []
         links, nodes, numbers = self.links, self.schema.nodes, self.schema.numbers
         query = "SELECT ?s ?p ?o WHERE {\n  " + "\n  UNION ".join(parts) + " }"
-        for count, (s, p, o) in enumerate(self.graph.solutions(query, SCENE)):
-            if not count % 4096:
-                check(RECOGNISING)
+        for s, p, o in checked(self.graph.solutions(query, SCENE), RECOGNISING):
             subject, said = text(s), text(p)
             names = isinstance(o, ox.NamedNode)
             if said in numbers:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import pyoxigraph as ox
 
 from confab.reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
-from confab.reasoner.limits import check
+from confab.reasoner.limits import checked
 from confab.reasoner.names import nearest
 from confab.reasoner.reading.problem import Reading
 from confab.reasoner.reading.rows import FIRST_INDEX_OF_NONE
@@ -37,9 +37,8 @@ def quantify(graph: KnowledgeGraph, reading: Reading, level: int) -> tuple[Groun
     found: dict[int, GroundBehavior] = {}
     for behavior in problem.domain.at_level(level):
         kinds = [parameter.kind for parameter in behavior.parameters]
-        for count, row in enumerate(graph.solutions(query_for(reading, behavior, ordered=False), SCENE)):
-            if not count % 4096:
-                check(f"quantifying {behavior.name} ({len(found):,} so far)")
+        rows = graph.solutions(query_for(reading, behavior, ordered=False), SCENE)
+        for row in checked(rows, f"quantifying {behavior.name}"):
             arguments = tuple(reading.names.short(text(term)) for term in tuple(row)[: len(kinds)])
             for argument, kind in zip(arguments, kinds, strict=True):
                 if argument not in problem.members(kind):

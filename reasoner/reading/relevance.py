@@ -26,7 +26,7 @@ from confab.reasoner.aggregates.dependencies import read_by
 from confab.reasoner.amounts import situations_in, terms_of
 from confab.reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
 from confab.reasoner.language import situations_of, terms
-from confab.reasoner.limits import check
+from confab.reasoner.limits import check, checked
 from confab.reasoner.names import local_name
 from confab.reasoner.reading.frame import Frame, frame
 from confab.reasoner.reading.goals import BOUNDS, with_goals
@@ -414,9 +414,7 @@ class _RouteSearch(Individuals):
         facts = set[str]()
         backward = bounds.backward.keys() - {*PLACES}
         nodes, forward = self.schema.nodes, bounds.forward
-        for count, (s, p, o) in enumerate(triples):
-            if not count % 4096:
-                check(RECOGNISING)
+        for s, p, o in checked(triples, RECOGNISING):
             if s in nodes:
                 continue
             if p in forward:

@@ -73,7 +73,7 @@ class Past:
 
     def _add(self, name: str, like: str) -> None:
         arguments = self.situations[like].arguments
-        self.situations[name] = SituationType(name, arguments, "Truth", default=FALSE, boolean=True)
+        self.situations[name] = SituationType(name, arguments, "Truth", default=FALSE, boolean=True, added=True)
 
 
 def iris_of_the_past(schema: OntologySchema) -> Iterator[str]:

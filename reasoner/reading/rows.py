@@ -18,7 +18,7 @@ from confab.reasoner.amounts import (
 )
 from confab.reasoner.condition_nodes import NodeValues
 from confab.reasoner.graph.knowledge import KnowledgeError, Term, text
-from confab.reasoner.limits import check
+from confab.reasoner.limits import checked
 from confab.reasoner.names import Names, local_name
 from confab.reasoner.vocabulary import CORE, OWL, TYPE
 
@@ -111,13 +111,9 @@ class OntologySchema:
 def nodes_of(triples: Iterable[tuple[str, str, str]]) -> dict[str, dict[str, list[str]]]:
     """Return the properties and values of each subject, sorted by subject and value."""
     nodes: dict[str, dict[str, list[str]]] = {}
-    for count, (subject, predicate, value) in enumerate(triples):
-        if not count % 4096:
-            check("reading the scene")
+    for subject, predicate, value in checked(triples, "reading the scene"):
         nodes.setdefault(subject, {}).setdefault(predicate, []).append(value)
-    for count, node in enumerate(nodes.values()):
-        if not count % 4096:
-            check("reading the scene")
+    for node in checked(nodes.values(), "reading the scene"):
         for values in node.values():
             if len(values) > 1:
                 values.sort()

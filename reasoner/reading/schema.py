@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 
 from confab.reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
-from confab.reasoner.limits import check
+from confab.reasoner.limits import checked
 from confab.reasoner.reading import swrl
 from confab.reasoner.reading.definitions import AXIOMS, EXPRESSIONS
 from confab.reasoner.reading.rows import (
@@ -68,9 +68,7 @@ matters (`nodes_of`, `classes_of`, `initial_state`).
 def read_schema(graph: KnowledgeGraph) -> OntologySchema:
     """Return the part of an ontology that doesn't depend on individuals, read by one query."""
     parts: dict[str, list[tuple[str, str, str]]] = defaultdict(list)
-    for count, (part, *row) in enumerate(graph.solutions(SCHEMA, SCENE)):
-        if not count % 4096:
-            check("reading the scene")
+    for part, *row in checked(graph.solutions(SCHEMA, SCENE), "reading the scene"):
         parts[text(part)].append(core_triple(row))
     written = [triple for triple in parts["node"] if graph.remote and triple[1] in TEXTS]
     if written:  # a remote store contains only the texts of updates

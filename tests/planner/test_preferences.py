@@ -134,6 +134,11 @@ def test_execution_leaves_the_same_goals_unmet() -> None:
     assert [goal["met"] for goal in done.json()["soft_goals"]] == [False, True]
 
 
+def test_a_soft_goal_that_an_intervention_drops_is_not_left_unmet() -> None:
+    done = confab.load("wishes-small").execute(interventions="after=0 drop-goal store STOCK")
+    assert [(str(goal.fact), goal.met) for goal in done.soft_goals] == [("glass IN shop", True)]
+
+
 def test_a_question_about_a_soft_goal_is_answered_with_its_weight() -> None:
     result = confab.load("wishes-small").plan()
     assert str(result.why_not("glass IN shop")).startswith("this is a soft goal (weight 5) already: ")
