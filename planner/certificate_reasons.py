@@ -86,46 +86,19 @@ def told(problem: Problem, certificate: Certificate) -> Reason:
         has = "doesn't contain" if one else "contains"
         text = f"{what} {how}: {which} of values of {about} {has} {'all of these goals' if many else 'this goal'}"
         return Reason(text, tuple(dict.fromkeys(terms)))
+    causes = _Causes(problem, certificate)
     if certificate.bounded or len(goals) > 1:
-        why, more = _excluded(problem, certificate)
         what = " and ".join(map(str, goals)) + " …" * (len(certificate.unmet) > SHOWN)
-        how = f"exclude each other: together they {why}" if len(goals) > 1 else f"can't hold: it would {why}"
+        try:
+            why, more = causes.excluded()
+        except (WorkLimitError, RecursionError):
+            why, more = "", ()
+        how = f"exclude each other{why}" if len(goals) > 1 else f"can't hold{why}"
         return Reason(f"{what} {how}", tuple(dict.fromkeys((*terms, *more))))
-    try:
-        chain, cause = _Causes(problem, certificate).chain()
-    except (WorkLimitError, RecursionError):
-        chain, cause = [], Cause("no behaviour has this effect")
     goal = certificate.unmet[0]
-    follows = [claim for claim in reversed(chain) if claim.fact != goal]
-    kept = [claim for claim in follows if certificate.always.get(claim.fact.symbol) == claim.fact.value]
-    never = [claim for claim in follows if claim not in kept]
-    so = "".join(
-        f"; so {_listed(facts)} {what} hold{'s' * (len(facts) == 1)}"
-        for what, facts in (("always", kept), ("never", never))
-        if facts
-    )
-    terms += [*cause.terms, *(word for claim in follows for word in _words(claim.fact))]
-    named = dict.fromkeys(word for word in terms if not word.startswith("?"))
-    return Reason(f"{goal} can't be reached: {cause.text}{so}", tuple(named))
-
-
-def _excluded(problem: Problem, certificate: Certificate) -> tuple[str, tuple[str, ...]]:
-    """Return why goals exclude each other in every state, as text that completes "they would", and the terms of the text."""
-    lowest = Lowest(problem)
-    cases = Cases(lowest, certificate)
-    for symbol in certificate.bounded:
-        constraint = problem.domain.constraints.get(symbol.situation)
-        if constraint is not None:
-            return f"violate the constraint that {constraint}", (constraint.situation,)
-        excess = cases.excess(FactEvaluation(lowest, cases.final(cases.first() or ())), symbol)
-        if excess is not None:
-            found, allowed = excess
-            over = found.low > allowed.high
-            got, end = (found.low, allowed.high) if over else (found.high, allowed.low)
-            more, most = ("least", "maximum") if over else ("most", "minimum")
-            amounts = f"at {more} {written(Fraction(got))}, and its {most} is {written(Fraction(end))}"
-            return f"make {_named(symbol)} {amounts}", (*symbol.arguments, symbol.situation)
-    return "contradict the definitions of derived facts", ()
+    why, more = causes.why(Claim(goal))
+    named = dict.fromkeys(word for word in (*terms, *more) if not word.startswith("?"))
+    return Reason(f"{goal} can't be reached: {why}", tuple(named))
 
 
 def _listed(claims: Sequence[Claim]) -> str:
@@ -146,19 +119,79 @@ class _Causes:
         self.lowest = Lowest(problem, WORK)
         self.claims = Claims(self.lowest, certificate)
 
+    def excluded(self) -> tuple[str, tuple[str, ...]]:
+        """Return why the goals exclude each other, as text that continues this statement, and the terms of the text."""
+        they = "together they" if len(self.certificate.unmet) > 1 else "it would"
+        needed, (why, terms) = self.needed(), self.violation()
+        because = f", because {' and '.join(self.holding(needed))}" if needed else ""
+        words = [word for claim in needed for word in _words(claim.fact)]
+        if terms or not needed:
+            return f": {they} {why}{because}", (*terms, *words)
+        if len(needed) > 1:
+            return because, tuple(words)
+        why, terms = self.why(needed[0])
+        return f"{because}: {why}", (*words, *terms)
+
+    def violation(self) -> tuple[str, tuple[str, ...]]:
+        """Return what the goals violate, as text that completes "they would", and the terms of the text."""
+        cases = Cases(self.lowest, self.certificate)
+        for symbol in self.certificate.bounded:
+            excess = cases.excess(FactEvaluation(self.lowest, cases.final(())), symbol)
+            if excess is None:
+                continue
+            constraint = self.problem.domain.constraints.get(symbol.situation)
+            if constraint is not None:
+                return f"violate the constraint that {constraint}", (constraint.situation,)
+            found, allowed = excess
+            over = found.low > allowed.high
+            got, end = (found.low, allowed.high) if over else (found.high, allowed.low)
+            more, most = ("least", "maximum") if over else ("most", "minimum")
+            amounts = f"at {more} {written(Fraction(got))}, and its {most} is {written(Fraction(end))}"
+            return f"make {_named(symbol)} {amounts}", (*symbol.arguments, symbol.situation)
+        return "contradict the definitions of derived facts", ()
+
+    def needed(self) -> list[Claim]:
+        """Return claims of the certificate that together exclude the goals from a final state; none of them is superfluous."""
+        certificate, found = self.certificate, list[Claim]()
+        for fact in sorted({*certificate.never, *map(Fact, certificate.always, certificate.always.values())}):
+            always = {symbol: value for symbol, value in certificate.always.items() if Fact(symbol, value) != fact}
+            fewer = replace(certificate, never=certificate.never - {fact}, always=always)
+            if Cases(self.lowest, fewer).ends_here(()):
+                found.append(Claim(fact))
+            else:
+                certificate = fewer
+        return found
+
+    def why(self, claim: Claim) -> tuple[str, tuple[str, ...]]:
+        """Return the first cause of a claim and its consequences as text, and the terms of the text."""
+        try:
+            chain, cause = self.chain(claim)
+        except (WorkLimitError, RecursionError):
+            chain, cause = [], Cause("no behaviour has this effect")
+        follows = [one for one in reversed(chain) if one.fact != claim.fact]
+        so = "".join(f"; so {text}" for text in self.holding(follows))
+        return cause.text + so, (*cause.terms, *(word for one in follows for word in _words(one.fact)))
+
+    def holding(self, claims: Sequence[Claim]) -> Iterator[str]:
+        """Yield as text which claims always hold, and which claims never hold."""
+        always = self.certificate.always
+        kept = [claim for claim in claims if always.get(claim.fact.symbol) == claim.fact.value]
+        for facts, what in ((kept, "always"), ([claim for claim in claims if claim not in kept], "never")):
+            if facts:
+                yield f"{_listed(facts)} {what} hold{'s' * (len(facts) == 1)}"
+
     def reading(self) -> tuple[FactEvaluation, _ClaimRecorder]:
         """Return the reader of conditions, and the view that records the used claims."""
         view = _ClaimRecorder(self.claims, ())
         return FactEvaluation(self.lowest, view), view
 
-    def chain(self) -> tuple[list[Claim], Cause]:
-        """Return the shortest chain of claims from the goal to a claim whose cause depends on no other claim."""
-        goal = Claim(self.certificate.unmet[0])
+    def chain(self, goal: Claim) -> tuple[list[Claim], Cause]:
+        """Return the shortest chain of claims from the given claim to a claim whose cause depends on no other claim."""
         queue: list[tuple[Claim, ...]] = [(goal,)]
         seen = {goal}
         last: tuple[tuple[Claim, ...], Cause] | None = None
         for chain in queue:  # the loop appends chains to the queue
-            for cause in self.causes(chain[-1]):
+            for cause in self.causes(chain[-1], first=len(chain) == 1):
                 if not cause.rests_on:
                     return list(chain), cause
                 if last is None:
@@ -169,8 +202,11 @@ class _Causes:
                         queue.append((*chain, claim))
         return ([goal], last[1]) if last else ([goal], Cause("no behaviour has this effect"))
 
-    def causes(self, claim: Claim) -> list[Cause]:
-        """For each behaviour that could make a claim false, return the cause that prevents it, the simplest cause first."""
+    def causes(self, claim: Claim, first: bool) -> list[Cause]:
+        """For each behaviour that could make a claim false, return the cause that prevents it, the simplest cause first.
+
+        The text of a cause doesn't repeat the `first` claim of a sentence.
+        """
         fact, free, lowest = claim.fact, dict(claim.kinds), self.lowest
         symbol, situation = fact.symbol, fact.symbol.situation
         if not free and not lowest.exists(situation, symbol.arguments):
@@ -227,7 +263,11 @@ class _Causes:
             stays = self.certificate.always.get(symbol)
             return [Cause(f"{_named(symbol)} is always {stays}" if stays else self.bounds_of(symbol))]
         if not found:
-            what = f"gives {_named(symbol)} another value" if kept else "has this effect"
+            what = (
+                f"gives {_named(symbol)} another value"
+                if kept
+                else f"has {'this effect' if first else f'the effect {claim}'}"
+            )
             return [Cause(f"no behaviour of level {lowest.level} {what}")]
         return sorted(found, key=lambda cause: (bool(cause.rests_on), cause.parts, len(cause.rests_on)))
 

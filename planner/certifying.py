@@ -294,7 +294,7 @@ class Relaxed:
                     after = (reading.amounts(behavior, env) or {}).get(symbol)
                     if after is None:
                         continue
-                    low, high = max(after[0].low, min(least, now.low)), min(after[0].high, max(most, now.high))
+                    low, high = after[0].low, after[0].high
                     if not constant:  # widen the range in one step to the farthest reachable amount
                         low = min(least, now.low) if low < now.low else low
                         high = max(most, now.high) if high > now.high else high
@@ -380,18 +380,14 @@ def _in_stages(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
 def _in_every_state(lowest: Lowest, find: Callable[[Lowest], Certificate | None]) -> Certificate | None:
     """Return a certificate with few goals that exclude each other in every state."""
     found = _with_little(lowest, SHARE * (lowest.most - lowest.work), partial(find, lowest))
-    if found is None:
-        return None
-    lowest.most = lowest.work + FEWER
-    for fact in found.unmet:
-        fewer = replace(found, unmet=tuple(other for other in found.unmet if other != fact))
-        if fewer.unmet:
-            found = _with_little(lowest, LITTLE[1], partial(_counted, lowest, fewer)) or found
-    return found
+    return None if found is None else _with_fewer(lowest, found)
 
 
 def _by_bounds(lowest: Lowest) -> Certificate | None:
-    """Return a certificate that some goals, in any state, violate a constraint or the bounds of a derived amount."""
+    """Return a certificate that some goals, in any state, violate a constraint or the bounds of a derived amount.
+
+    Without goals, an amount can have its initial value, which is never an excess; therefore each excess involves goals.
+    """
     domain, classes = lowest.problem.domain, lowest.problem.classes
     goals = tuple(Fact(symbol, wanted) for symbol, wanted in sorted(lowest.problem.goal.items()))
     cases = Cases(lowest, Certificate(unmet=goals))
@@ -401,7 +397,7 @@ def _by_bounds(lowest: Lowest) -> Certificate | None:
             symbol, final = Symbol(name, individuals), cases.final(())
             if is_bounded(lowest.problem, symbol) and cases.excess(FactEvaluation(lowest, final), symbol) is not None:
                 used = tuple(f for f in goals if f.symbol in final.used or f.symbol.situation == violation)
-                return Certificate(unmet=used or goals[:1], bounded=(symbol,))
+                return Certificate(unmet=used, bounded=(symbol,))
     return None
 
 
@@ -471,12 +467,19 @@ def _by_states(lowest: Lowest) -> Certificate | None:
 
 
 def _with_fewer(lowest: Lowest, found: Certificate) -> Certificate:
-    """Return a certificate without superfluous symbols; each symbol is tested with a small work limit."""
+    """Return a certificate without superfluous symbols and goals; each is tested with a small work limit."""
     most = min(lowest.work + FEWER, lowest.most)
-    for symbol in sorted(found.told_apart):
-        fewer = replace(found, told_apart={s: values for s, values in found.told_apart.items() if s != symbol})
+
+    def reduced(fewer: Certificate) -> Certificate | None:
         work = min(LITTLE[1], SHARE * (most - lowest.work))
-        found = _with_little(lowest, work, partial(_counted, lowest, fewer)) or found
+        return _with_little(lowest, work, partial(_counted, lowest, fewer))
+
+    for symbol in sorted(found.told_apart):
+        told_apart = {s: values for s, values in found.told_apart.items() if s != symbol}
+        found = reduced(replace(found, told_apart=told_apart)) or found
+    for fact in found.unmet if len(found.unmet) > 1 else ():
+        unmet = tuple(other for other in found.unmet if other != fact)
+        found = (reduced(replace(found, unmet=unmet)) if unmet else None) or found
     return found
 
 

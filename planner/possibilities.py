@@ -502,6 +502,8 @@ class FactEvaluation:
         """Return the ranges of the amounts that a behaviour may change, each with a flag that tells whether the change is certain.
 
         Return None if the behaviour certainly isn't applicable, because an amount would have no value or violate its bounds.
+
+        A range is limited to the bounds, which hold after each effect, and to the old range, for an amount that no effect changes.
         """
         after: dict[Symbol, tuple[Range, bool]] = {}
         for effect in behavior.amounts:
@@ -530,15 +532,14 @@ class FactEvaluation:
             quantity = self.lowest.quantity(symbol.situation)
             if quantity is None:
                 return None
-            low = new.low if quantity.least is None else max(new.low, quantity.least)
-            high = new.high if quantity.most is None else min(new.high, quantity.most)
-            allowed = low <= high and not (low == high and not quantity.allows(low))
-            if not allowed and surely:
+            least = -math.inf if quantity.least is None else quantity.least
+            most = math.inf if quantity.most is None else quantity.most
+            if not surely and (kept := self.before(symbol)) is not None:
+                least, most = min(least, kept.low), max(most, kept.high)
+            low, high = max(new.low, least), min(new.high, most)
+            if low > high or (surely and low == high and not quantity.allows(low)):
                 return None
-            if allowed and surely:
-                after[symbol] = Range(low, high), surely
-            elif not surely:
-                after[symbol] = Range(new.low, new.high), surely
+            after[symbol] = Range(low, high), surely
         return after
 
 

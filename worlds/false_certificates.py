@@ -9,7 +9,7 @@ from random import Random
 
 from confab.planner.certificate_checks import refusal
 from confab.planner.certificates import Certificate
-from confab.reasoner.amounts import written
+from confab.reasoner.amounts import Quantity, written
 from confab.reasoner.symbols import FALSE, TRUE, Fact, Problem, Symbol
 from worlds.interpreter import Interpreter, State, TooManyStatesError
 
@@ -45,11 +45,14 @@ def corrupted(problem: Problem, certificate: Certificate, rng: Random) -> Iterat
             yield "with another constant", replace(certificate, always={**certificate.always, one: name})
     meant = Interpreter(problem)
     if certificate.bounded and not (certificate.never or certificate.always or certificate.told_apart):
-        plain = {one: value for one, value in problem.goal.items() if meant.kinds[one.situation].quantity is None}
-        slots = zip(meant.slots, meant.initial, strict=False)
-        end = meant.closed([plain.get(one, value) for one, value in slots])
-        if all(meant.meets(end, fact.symbol, fact.value) for fact in certificate.unmet):
-            yield "without the violated bound", replace(certificate, bounded=())
+        bounds = [one for one in meant.slots if one.situation in problem.domain.aggregates]
+        drawn = [("without the violated bound", replace(certificate, bounded=()))]
+        for one in rng.sample(bounds, min(3, len(bounds))):
+            drawn.append(("with another bound", replace(certificate, bounded=(one,))))
+        for goal in certificate.unmet if len(certificate.unmet) > 1 else ():
+            fewer = tuple(fact for fact in certificate.unmet if fact != goal)
+            drawn.append(("with fewer goals beyond a bound", replace(certificate, unmet=fewer)))
+        yield from ((what, less) for what, less in drawn if refuted(meant, less))
     for fact in rng.sample(sorted(certificate.never), min(3, len(certificate.never))):
         less = replace(certificate, never=certificate.never - {fact})
         if disproved(meant, less, fact.symbol, [v for v in given(problem, fact.symbol.situation) if v == fact.value]):
@@ -110,6 +113,30 @@ def given(problem: Problem, situation: str) -> list[str]:
                 kind = behavior.kinds.get(effect.value)
                 found.update([effect.value] if kind is None else problem.members(kind))
     return sorted(found)
+
+
+def refuted(meant: Interpreter, certificate: Certificate) -> bool:
+    """Return whether a state has the goals, and keeps the bounds, of a certificate without claims.
+
+    The state is the initial state with the goals; a certificate without claims allows this state, reachable or not.
+    """
+    goals = {fact.symbol: fact.value for fact in certificate.unmet}
+    end = list(meant.initial)
+    for symbol, at in meant.slots.items():
+        if symbol in goals and at < meant.stated and meant.kinds[symbol.situation].quantity is None:
+            if goals[symbol] not in (end[at], *given(meant.problem, symbol.situation)):
+                return False  # no state has this value
+            end[at] = goals[symbol]
+    state = meant.closed(end)
+
+    def kept(symbol: Symbol) -> bool:
+        """Return whether a derived amount is within its bounds, or as far beyond them as in the initial state."""
+        first, now = meant.value(meant.initial, symbol), meant.value(state, symbol)
+        quantity = meant.kinds[symbol.situation].quantity or Quantity()
+        above = quantity.least is None or now >= min(quantity.least, first)
+        return above and (quantity.most is None or now <= max(quantity.most, first))
+
+    return all(map(kept, certificate.bounded)) and all(meant.meets(state, one, value) for one, value in goals.items())
 
 
 def disproved(meant: Interpreter, certificate: Certificate, symbol: Symbol, values: Iterable[str]) -> bool:

@@ -6,6 +6,7 @@ import json
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
+from fractions import Fraction
 from functools import cache
 from pathlib import Path
 from random import Random
@@ -13,21 +14,38 @@ from random import Random
 import pytest
 
 import confab
+from confab.planner import certifying
 from confab.planner.certificate_checks import refusal
 from confab.planner.certificates import Certificate, certificate_from, certificate_json
 from confab.planner.certified import certified
 from confab.planner.certifying import certify
 from confab.planner.plan import Outcome, Reason, Status
+from confab.planner.possibilities import Lowest
 from confab.planner.solve import MODES, Mode, Request, solve
-from confab.reasoner.symbols import FALSE, TRUE, EqualityCondition, Fact, Problem, SituationType, Symbol, spread
+from confab.reasoner.amounts import Quantity
+from confab.reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AmountEffect,
+    Behavior,
+    EqualityCondition,
+    Fact,
+    Parameter,
+    Problem,
+    SituationType,
+    Symbol,
+    spread,
+)
 from worlds.agreement import solvable
 from worlds.false_certificates import corrupted
 from worlds.hierarchies import hierarchy
 from worlds.interpreter import Interpreter, TooManyStatesError
 from worlds.mixed import mixed
-from worlds.writing import becomes, behavior, world
+from worlds.scenes import scene
+from worlds.writing import becomes, behavior, has, world
 
 CASES = Path(__file__).with_name("cases")
+BAYS = ["acid2 IN bay1", "base2 IN bay2", "bleach IN bay3", "fuel IN bay5", "peroxide IN bay4", "solvent IN bay6"]
 
 
 def answered(case: str, mode: Mode) -> Outcome:
@@ -110,6 +128,81 @@ def test_a_corrupted_certificate_is_refused() -> None:
             kinds[what] += 1
     assert kinds.total() >= 50
     assert {"without a fact that is never true", "without a symbol of told_apart"} <= kinds.keys()
+
+
+@pytest.mark.parametrize("goal", [BAYS, ["acid1 IN bay6", "base1 IN bay6"], ["bay6 CLASH true"]])
+def test_a_certificate_of_a_violated_bound_is_refused_with_fewer_goals_or_another_bound(goal: list[str]) -> None:
+    result = confab.load("drums-large").plan(goal=goal)
+    certificate = result.outcome.certificate
+    assert certificate is not None and certificate.bounded
+    drawn = [*corrupted(result.problem, certificate, Random(1))]
+    assert [what for what, bad in drawn if refusal(result.problem, bad) is None] == []
+    bounds = {"without the violated bound", "with fewer goals beyond a bound"}
+    assert len(goal) == 1 or bounds <= {what for what, _ in drawn}
+    assert goal != BAYS or "with another bound" in dict(drawn)
+
+
+@pytest.mark.parametrize("seed", [500_675, 600_054])
+def test_an_amount_that_a_conditional_effect_keeps_within_its_bounds_is_certified(seed: int, tmp_path: Path) -> None:
+    (tmp_path / "world.ttl").write_text(scene(mixed(seed)))
+    outcome = confab.load(tmp_path / "world.ttl").plan().outcome
+    assert outcome.status is Status.UNSOLVABLE and outcome.certificate is not None
+
+
+@pytest.mark.parametrize(
+    ("first", "operation", "by", "true", "false"),
+    [
+        ("2", "decrease", 1, ">=0", ">=1"),  # the least amount is 0
+        ("2", "increase", 1, "<=3", "<=2"),  # the most is 3
+        ("5", "increase", 1, ">=5", "<=3"),  # an amount beyond its bounds stays as it is, or comes within them
+        ("5", "decrease", 3, "<=5", ">=5"),
+        ("5", "assign", 1, ">=1", ">=2"),
+    ],
+)
+def test_a_claim_about_an_amount_is_refused_exactly_if_a_conditional_effect_can_break_it(
+    first: str, operation: str, by: int, true: str, false: str
+) -> None:
+    lit = SituationType("LIT", ("Lamp",), "Truth", boolean=True)
+    oil = SituationType("OIL", ("Lamp",), "", quantity=Quantity(least=Fraction(0), most=Fraction(3)))
+    burn = Behavior("BURN", 1, (Parameter("?l", "Lamp"),), amounts=(
+        AmountEffect("OIL", ("?l",), operation, Fraction(by), (has("LIT", "?l", TRUE),)),
+    ))  # fmt: skip
+    switch = behavior("SWITCH", 1, "?l:Lamp", [], [becomes("LIT", "?l", TRUE)])
+    problem = world([lit, oil], [burn, switch], {"Lamp": ("lamp",)}, {"OIL lamp": first}, {"OIL lamp": "9"})
+    amount, unmet = Symbol("OIL", ("lamp",)), (Fact(Symbol("OIL", ("lamp",)), "9"),)
+    assert refusal(problem, Certificate(always={amount: true}, unmet=unmet)) is None
+    assert refusal(problem, Certificate(always={amount: false}, unmet=unmet)) is not None
+
+
+@pytest.mark.parametrize(
+    ("seed", "constrained", "reason"),
+    [
+        (
+            100_227,
+            0.0,
+            "z3 M1 a2 >3 and z3 D0 true exclude each other, because a2 R2 a1 false never holds: no behaviour",
+        ),
+        (100_546, 1.0, "a1 D1 z4 true and a1 R0 z4 false exclude each other, because a1 R0 z3 true never holds: no"),
+    ],
+)
+def test_the_reason_why_goals_exclude_each_other_names_the_fact_that_never_holds(
+    seed: int, constrained: float, reason: str, tmp_path: Path
+) -> None:
+    (tmp_path / "world.ttl").write_text(scene(mixed(seed, constrained=constrained)))
+    outcome = confab.load(tmp_path / "world.ttl").plan().outcome
+    assert outcome.reason is not None and outcome.reason.text.startswith(reason)
+
+
+@pytest.mark.parametrize("most", [1_000, 3_000])
+def test_the_search_for_a_certificate_with_few_goals_keeps_its_work_limit(
+    most: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = confab.load("drums-large").with_goal(*BAYS).problem
+    lowest = Lowest(problem, most)
+    monkeypatch.setattr(certifying, "Lowest", lambda *_: lowest)
+    found = certify(problem, most)
+    assert found is not None and found.bounded
+    assert lowest.work <= most
 
 
 def test_a_certificate_proves_nothing_of_a_task_that_has_a_plan() -> None:
