@@ -5,6 +5,7 @@
 #   make bench    measure all figures of the documentation anew, for hours
 #   make figures  the quick ones of them: lengths, counts, ratios
 #   make vocabulary  docs/vocabulary.md from the ontology files
+#   make modules     docs/modules.md from the docstrings of the modules
 #   make docs     the documentation as a site in build/site, warnings as errors
 #   make notebooks  execute the book of notebooks anew, and keep what they show
 #   make fuzz     100,000 broken inputs at every door, going on where the last run ended
@@ -26,7 +27,7 @@ SHARED := -n auto --dist worksteal --durations 10
 # Compiled modules are kept, whatever the environment says: tests start hundreds of processes.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help demo test check bench figures vocabulary docs notebooks fuzz lock clean
+.PHONY: help demo test check bench figures vocabulary modules docs notebooks fuzz lock clean
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -45,6 +46,9 @@ check: $(VENV)/installed
 
 vocabulary: $(VENV)/installed
 	@$(BIN)/python -m benchmarks.vocabulary
+
+modules: $(VENV)/installed
+	@$(BIN)/python -m benchmarks.modules
 
 fuzz: $(VENV)/installed
 	@$(BIN)/python -m benchmarks.fuzz

@@ -10,6 +10,7 @@ import subprocess
 import sys
 from importlib.util import find_spec
 from pathlib import Path
+from pkgutil import resolve_name
 
 import click
 import pytest
@@ -127,3 +128,22 @@ def test_the_files_and_names_in_references_of_the_docs_exist() -> None:
         if not (ROOT / file).exists() or name not in defined(ROOT / file)
     ]
     assert missing == []
+
+
+def test_the_python_files_and_the_names_of_modules_on_all_pages_exist() -> None:
+    pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *DOCS.rglob("*.md")]
+    text = "\n".join(page.read_text(encoding="utf-8") for page in pages)
+    files = set(re.findall(r"`((?:\w+/)+\w+\.py)\b", text))
+    assert len(files) > 100
+    assert sorted(file for file in files if not (ROOT / file).exists()) == []
+    groups_of_entry_points = {"confab.skills", "confab.perceivers"}
+    names = set(re.findall(r"\bconfab(?:\.\w+)+", text)) - groups_of_entry_points
+    assert sorted(name for name in names if not resolves(name)) == []
+
+
+def resolves(name: str) -> bool:
+    try:
+        resolve_name(name)
+    except (AttributeError, ImportError):
+        return False
+    return True
