@@ -85,9 +85,9 @@ SHOW = (
 SCENE = {
     "title": "label name caption heading display_name labelled get_label get_title get_name comment description_text",
     "knowledge.prefixes": "prefixes namespaces namespace prefix ns prefix_map bind namespace_manager",
-    "graph.serialize(FILE)": "save_state "
-    "serialize serialise save write dump write_ttl to_file save_as store export_owl to_owl_file "
-    "export_ttl save_scene write_file write_graph",
+    "save(FILE)": "save_state save_to to_path "
+    "serialize serialise write dump write_ttl to_file save_as store export_owl to_owl_file "
+    "export_ttl save_scene write_file write_graph to_turtle_file",
     "query(TEXT), which reads inferred facts": "inferred inferred_graph infer reason reasoner run_reasoner entailments "
     "entailed materialize materialise closure owlrl expand",
     "query(TEXT), or plan()": "search",
@@ -435,10 +435,10 @@ MEMORY = {
     "confab.Memory.of(SCENE)": "new create empty for_scene from_scene init blank make from_scenes",
     "save(FILE)": "write dump store to_file export persist save_to serialize to_ttl to_turtle commit write_ttl "
     "save_as to_rdf",
-    "learn(SCENE, PLAN)": "add train update fit record remember append observe add_episode add_plan store_plan "
+    "learn(RESULT)": "add train update fit record remember append observe add_episode add_plan store_plan "
     "insert learn_from add_experience partial_fit learn_episode reinforce add_example put experience_replay step "
     "backward push",
-    "teach(SCENE, PLAN)": "demonstrate show_plan imitate demonstration add_demonstration from_demonstration "
+    "teach(RESULT)": "demonstrate show_plan imitate demonstration add_demonstration from_demonstration "
     "learn_from_demonstration",
     "live": "add_execution learn_execution online learn_online",
     "merge(OTHER)": "combine join union extend add_memory update_from plus merge_with concat share sync",

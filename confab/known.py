@@ -15,6 +15,7 @@ import pyoxigraph as ox
 from confab.accepting import Facts, Stated, several, sparql_of
 from confab.reasoner.graph.inference import infer
 from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, text
+from confab.reasoner.kinds import SAVED, stamped
 from confab.reasoner.limits import within
 from confab.reasoner.names import GUESSING, Named, Names, RightNames, local_name, nearest, right_names
 from confab.reasoner.reading.goals import parse_fact, some_of
@@ -235,6 +236,36 @@ class Known(metaclass=RightNames):
         copy = change(self.knowledge, self.reading, [Fact(*parse_fact(self.problem, text)) for text in texts])
         infer(copy)
         return type(self)(copy, dict(self.seconds))
+
+    def save(self, path: str | Path) -> Path:
+        """Write the scene with all ontologies that it imports into one Turtle file, which `load` accepts, and return the path.
+
+        The file has the stated facts, also those of `with_fact` and of changes in `graph`, without inferred facts.
+
+        Raises
+        ------
+        KnowledgeError
+            The name doesn't end in ``.ttl``, or the scene is at a SPARQL endpoint.
+        OSError
+            The file can't be written, or contains anything but an unchanged saved scene.
+
+        Examples
+        --------
+        >>> import confab
+        >>> from tempfile import TemporaryDirectory
+        >>> scene = confab.load("beverage-serving").with_fact("cup1 LOCATION location7")
+        >>> with TemporaryDirectory() as folder:
+        ...     confab.load(scene.save(f"{folder}/changed.ttl")).plan().plan.length
+        {1: 3, 2: 8, 3: 26}
+        """
+        from confab.reasoner.files import write_whole
+
+        path = Path(path)
+        if path.suffix != ".ttl":
+            raise KnowledgeError(f"{path}: a scene is saved as Turtle; wanted a name that ends in .ttl")
+        self.settle()
+        write_whole(path, stamped(SAVED, [self.knowledge.turtle()]))
+        return path
 
     @cached_property
     def graph(self) -> rdflib.Graph:

@@ -13,9 +13,9 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol, cast
 
-from confab.accepting import AnyPlan, plan_of
+from confab.accepting import AnyPlan, HasPlan, plan_of
 from confab.planner.paper.learning import learn as learn_plan
 from confab.planner.plan import Plan, Step
 from confab.reasoner.files import alone, has_content, write_whole
@@ -67,6 +67,14 @@ counts for the default planner.
 """
 SHOWN = 3
 """Maximum number of preferences that are listed for a method."""
+
+
+class HasSceneAndPlan(HasPlan, Protocol):
+    """An object with a plan and the scene in which it was made, such as a result or an execution."""
+
+    @property
+    def scene(self) -> Known:
+        """The scene."""
 
 
 @right_names("a memory", "confab.Memory.of(SCENE) or confab.Memory.load(FILE)")
@@ -155,13 +163,16 @@ class Memory(metaclass=RightNames):
         found.trusted.update(found.experience.episodes if trust else found.experience.trusts)
         return found
 
-    def learn(self, scene: Known, plan: AnyPlan, failed: tuple[int, ...] | None = None) -> None:
+    def learn(
+        self, scene: Known | HasSceneAndPlan, plan: AnyPlan | None = None, failed: tuple[int, ...] | None = None
+    ) -> None:
         """Learn from a plan that was executed from the scene's initial state.
 
         Parameters
         ----------
-        scene : Scene
-        plan : Plan, Result, Execution or file
+        scene : Scene, Result or Execution
+            A result or an execution has its scene, so that `plan` isn't needed.
+        plan : Plan, Result, Execution or file, optional
             An executed plan. For an execution, the method `live` is called.
         failed : path of a step, optional
             The failed step, or None. All earlier steps have succeeded, and no later step was executed.
@@ -174,26 +185,28 @@ class Memory(metaclass=RightNames):
         from confab.planner.acting.episode import Episode
         from confab.planner.experience.lessons import live
 
-        if isinstance(episode := getattr(plan, "episode", None), Episode):
-            self.live(scene.problem, episode)
+        where, executed = _scene_and_plan(scene, plan)
+        if isinstance(episode := getattr(executed, "episode", None), Episode):
+            self.live(where.problem, episode)
             return
-        planned = getattr(plan, "problem", scene.problem)  # the plan of a result was made for the result's goal
-        problem = replace(scene.problem, goal=planned.goal)
-        plan = plan_of(plan, problem)
+        planned = getattr(executed, "problem", where.problem)  # the plan of a result was made for the result's goal
+        problem = replace(where.problem, goal=planned.goal)
+        made = plan_of(executed, problem)
         try:
-            links = self._linked(scene, plan) if failed is None else self.links
-            live(self.experience, [(problem, plan)], failed)
+            links = self._linked(where, made) if failed is None else self.links
+            live(self.experience, [(problem, made)], failed)
         except LearningError as error:
             raise KnowledgeError(str(error)) from error
         self.links = links
 
-    def teach(self, scene: Known, plan: AnyPlan) -> None:
+    def teach(self, scene: Known | HasSceneAndPlan, plan: AnyPlan | None = None) -> None:
         """Learn from solutions of a scene for several orders of its goals (`confab.planner.experience.lessons`).
 
         Parameters
         ----------
-        scene : Scene
-        plan : Plan, Result or file
+        scene : Scene or Result
+            A result has its scene, so that `plan` isn't needed.
+        plan : Plan, Result or file, optional
             A plan that solves the scene's task.
 
         Raises
@@ -203,10 +216,11 @@ class Memory(metaclass=RightNames):
         """
         from confab.planner.experience.lessons import teach
 
-        made = plan_of(plan, scene.problem)
+        where, solution = _scene_and_plan(scene, plan)
+        made = plan_of(solution, where.problem)
         try:
-            links = self._linked(scene, made)
-            teach(self.experience, scene.problem, made)
+            links = self._linked(where, made)
+            teach(self.experience, where.problem, made)
         except LearningError as error:
             raise KnowledgeError(str(error)) from error
         self.links = links
@@ -513,3 +527,20 @@ def failed_steps(problem: Problem, episode: Episode) -> Iterator[tuple[Problem, 
 
 
 __all__ = ["FORMAT", "GoalKind", "LearnedOrder", "Memory", "probability"]
+
+
+def _scene_and_plan(scene: Known | HasSceneAndPlan, plan: AnyPlan | None) -> tuple[Known, AnyPlan]:
+    """Return a scene and a plan that are given as two arguments, or as one: a result or an execution.
+
+    Raises
+    ------
+    TypeError
+        Only a scene, or only a plan without its scene, is given.
+    """
+    if plan is not None:
+        return cast("Known", scene), plan
+    made = cast("HasSceneAndPlan", scene)
+    if not hasattr(made, "scene"):
+        wanted = "a result or an execution, which has its scene, or a scene and a plan"
+        raise TypeError(f"wanted {wanted}; got {type(scene).__name__} alone")
+    return made.scene, made

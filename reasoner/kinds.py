@@ -27,8 +27,9 @@ REPORT, PICTURE, FILM = "a report", "a picture", "a film"
 PLAN, VERDICTS, ROWS, TRIPLES = "a plan", "verdicts", "rows of a query", "triples of a query"
 MEMORY, EPISODE, OBSERVED, REACH = "a memory", "an episode", "observed facts", "facts of what hands reach"
 TRAJECTORIES = "trajectories"
-GENERATED, IMPORTED, CONVERTED, CONSTRUCTED = (
+GENERATED, SAVED, IMPORTED, CONVERTED, CONSTRUCTED = (
     "a generated scene",
+    "a saved scene",
     "an imported scene",
     "a converted ontology",
     "a constructed ontology",

@@ -39,6 +39,9 @@ SCENE = ("asserted", "inferred", "reach")
 TRIPLE_TERMS = (b"<<", b"{|", b"parseType")
 """The three notations of triple terms (triples as subjects or objects) in files."""
 HAS_TRIPLE_TERM = "ASK { ?s ?p ?o FILTER(isTRIPLE(?o)) }"
+ONTOLOGIES = "SELECT ?iri WHERE { ?iri a owl:Ontology } ORDER BY ?iri"
+SPARQL_TEXTS = (CORE + "update", CORE + "construct")
+"""Properties whose values are SPARQL texts, which use the prefixes of their file."""
 NO_ROWS = "wanted a SELECT query, whose answer is rows"
 
 Term = ox.NamedNode | ox.BlankNode | ox.Literal | None
@@ -96,6 +99,8 @@ class KnowledgeGraph:
         The reasons why planning in the scene is impossible, if the scene was loaded with `tolerant`.
     written : mapping of individual to place
         For each individual that was compiled from a SPARQL update, the position in this update.
+    compiled : set of pyoxigraph.Triple
+        The triples that were compiled from SPARQL updates; no file states them.
     remote : Remote, optional
         A remote store that is queried instead of `store`; it is never changed.
     round_trips : int
@@ -109,6 +114,7 @@ class KnowledgeGraph:
     declared: dict[str, str] = field(default_factory=dict)
     faults: list[str] = field(default_factory=list)
     written: dict[str, TextPosition] = field(default_factory=dict)
+    compiled: set[ox.Triple] = field(default_factory=set)
     remote: Remote | None = None
     round_trips: int = 0
 
@@ -163,6 +169,22 @@ class KnowledgeGraph:
             for q in self.store.quads_for_pattern(None, None, None, ox.NamedNode(BASE + name))
         }
         return ox.serialize(sorted(triples, key=str), format=ox.RdfFormat.N_TRIPLES) or b""
+
+    def turtle(self) -> str:
+        """Return the stated triples, without triples that were compiled from SPARQL updates, as Turtle."""
+        if self.remote:
+            raise KnowledgeError(f"{self.scene}: a remote store is only read; export it with its own tools")
+        prefixes = {**self.prefixes, **self.declared}
+        quads = self.store.quads_for_pattern(None, None, None, ox.NamedNode(BASE + "asserted"))
+        stated = {quad.triple for quad in quads} - self.compiled
+        for subject, own in _spelled(self).items():  # a file may declare the same prefixes for other namespaces
+            lines = "".join(f"PREFIX {prefix}: <{iri}>\n" for prefix, iri in own.items() if prefixes.get(prefix) != iri)
+            for triple in [t for t in stated if lines and t.subject == ox.NamedNode(subject)]:
+                if triple.predicate.value in SPARQL_TEXTS and isinstance(triple.object, ox.Literal):
+                    literal = ox.Literal(lines + triple.object.value)
+                    stated = stated - {triple} | {ox.Triple(triple.subject, triple.predicate, literal)}
+        ordered = sorted(stated, key=str)
+        return (ox.serialize(ordered, format=ox.RdfFormat.TURTLE, prefixes=prefixes) or b"").decode("utf-8")
 
     def query(self, query: str, graphs: Sequence[str] = GRAPHS, **bindings: str) -> Answer:
         """Return the result of any SPARQL 1.1 query on the union of some graphs; for a remote store, on its own dataset."""
@@ -246,14 +268,16 @@ def load(
 
 def write_out(graph: KnowledgeGraph) -> list[UpdateFault]:
     """Compile the updates and queries of behaviours and rules into individuals, and return the faults in these texts."""
-    texts = [ox.NamedNode(CORE + name) for name in ("update", "extends", "construct")]
-    if not any(next(graph.store.quads_for_pattern(None, text, None, None), None) for text in texts):
+    texts = map(ox.NamedNode, (*SPARQL_TEXTS, CORE + "extends"))
+    if not any(next(graph.store.quads_for_pattern(None, one, None, None), None) for one in texts):
         return []
     from confab.reasoner.updates.compiling import compiled
 
     found = compiled(lambda query: graph.select(query, SCENE), _spelled(graph), graph.prefixes)
     asserted = ox.NamedNode(BASE + "asserted")
-    graph.store.extend(ox.Quad(t.subject, t.predicate, t.object, asserted) for t in found.triples)
+    quads = {ox.Quad(t.subject, t.predicate, t.object, asserted) for t in found.triples}
+    graph.compiled |= {quad.triple for quad in quads if quad not in graph.store}
+    graph.store.extend(quads)
     graph.written |= found.places
     return found.faults
 
@@ -266,8 +290,7 @@ def _spelled(graph: KnowledgeGraph) -> dict[str, dict[str, str]]:
             if b"update" not in content and b"construct" not in content:
                 continue
             parser = ox.parse(content, format=form, base_iri=file.resolve().as_uri())
-            texts = (CORE + "update", CORE + "construct")
-            behaviors = [str(quad.subject)[1:-1] for quad in parser if quad.predicate.value in texts]
+            behaviors = [text(quad.subject) for quad in parser if quad.predicate.value in SPARQL_TEXTS]
             own = dict(parser.prefixes)
             prefixes |= dict.fromkeys(behaviors, own)
     return prefixes
@@ -314,21 +337,27 @@ def _load(graph: KnowledgeGraph, path: Path, others: Sequence[Path], tolerant: b
 
     read_into(graph, path, "asserted")
     graph.scene = path.as_uri()
+    inside = {text(iri) for (iri,) in graph.select(ONTOLOGIES)}
     with forgiven():
-        graph.scene = _only_ontology(graph, path)
+        graph.scene = _scene_of(graph, path)
     given = {iri: file for file in others for iri in sorted(_said(file, "Ontology") or {file.as_uri()})}
     waiting = [(graph.scene, path), *given.items()]
     places: dict[Path, Mapping[str, Path]] = {}
+    done = set[str]()
     while waiting:
         iri, file = waiting.pop(0)
-        if iri in graph.files:
+        if iri in done:
             continue
-        if iri != graph.scene:
+        done.add(iri)
+        if file != path:
             with forgiven():
                 read_into(graph, file, "asserted")
-        graph.files[iri] = file
+        if file != path or iri == graph.scene:
+            graph.files[iri] = file
         for imported in _imports(graph, iri):
-            if imported not in graph.files:
+            if imported in inside:  # the scene's file contains this ontology
+                waiting.append((imported, path))
+            elif imported not in done:
                 with forgiven():
                     waiting.append((imported, given.get(imported) or _locate(imported, file, places)))
     reach = path.with_name(f"{path.stem}.reach.ttl")
@@ -430,13 +459,20 @@ def read_prefixes(graph: KnowledgeGraph, file: Path) -> None:
             graph.declared.setdefault(prefix, namespace)
 
 
-def _only_ontology(graph: KnowledgeGraph, path: Path) -> str:
-    rows = graph.select("SELECT ?iri WHERE { ?iri a owl:Ontology } ORDER BY ?iri")
-    if len(rows) != 1 or not isinstance(rows[0][0], ox.NamedNode):
+def _scene_of(graph: KnowledgeGraph, path: Path) -> str:
+    """Return the IRI of the scene in a file: the only ontology that no other ontology of the file imports."""
+    found = [iri for (iri,) in graph.select(ONTOLOGIES)]
+    imported = {
+        text(iri) for (iri,) in graph.select("SELECT ?iri WHERE { ?other owl:imports ?iri FILTER(?other != ?iri) }")
+    }
+    roots = [iri for iri in found if text(iri) not in imported]
+    if len(roots) != 1 or not isinstance(roots[0], ox.NamedNode):
+        which = f": {', '.join(map(str, roots))}" if len(roots) > 1 else ""
         raise KnowledgeError(
-            f"{path}: wanted one 'a owl:Ontology' with an IRI, found {len(rows)}; a scene declares itself with it"
+            f"{path}: wanted one 'a owl:Ontology' with an IRI, which no other ontology of the file imports, "
+            f"found {len(roots)}{which}; a scene declares itself with it"
         )
-    return rows[0][0].value
+    return roots[0].value
 
 
 def _imports(graph: KnowledgeGraph, iri: str) -> Sequence[str]:

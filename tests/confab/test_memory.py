@@ -226,3 +226,15 @@ def test_commands_report_an_episode_that_teaches_nothing(tmp_path: Path) -> None
     learned = CliRunner().invoke(app, ["learn", "beverage-serving", "--memory", str(memory), "--episode", str(episode)])
     assert learned.exit_code == 1
     assert "nothing was learned: no step was executed as planned, and no behaviour failed" in learned.stderr
+
+
+def test_a_memory_learns_from_a_result_that_has_its_scene(scene: confab.Scene) -> None:
+    result = scene.plan()
+    one, two = confab.Memory.of(scene), confab.Memory.of(scene)
+    one.learn(result)
+    two.learn(scene, result.plan)
+    assert one.links == two.links
+    with pytest.raises(
+        TypeError, match="a result or an execution, which has its scene, or a scene and a plan; got Plan alone"
+    ):
+        one.learn(result.plan)  # type: ignore[arg-type]

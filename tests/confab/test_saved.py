@@ -88,3 +88,46 @@ def test_a_command_writes_the_page_of_a_saved_episode(tmp_path: Path) -> None:
     assert '"status":"a plan, checked"' in page.read_text()
     wrong = invoke(app, ["report", "towers-small", "--plan", str(visit), "-o", str(page)])
     assert "belong together" in str(wrong.exception)
+
+
+@pytest.mark.parametrize("name", ["library-small", "carts-small", "rooms-snacks", "beverage-serving"])
+def test_a_saved_scene_is_the_same_task_in_one_file(name: str, tmp_path: Path) -> None:
+    """The file contains all imported ontologies; SPARQL texts keep the prefixes of their own files."""
+    scene = confab.load(name)
+    again = confab.load(scene.save(tmp_path / "saved.ttl"))
+    assert again.problem == scene.problem
+    compiled = "L1_BRING.book"  # a parameter that is compiled from the text of L1_BRING
+    assert compiled not in (tmp_path / "saved.ttl").read_text(encoding="utf-8")
+
+
+def test_a_changed_scene_is_saved_with_its_changes(tmp_path: Path) -> None:
+    scene = confab.load("beverage-serving").with_fact("cup1 LOCATION location7").with_goal("cup2 LOCATION location8")
+    saved = confab.load(scene.save(tmp_path / "saved.ttl"))
+    assert saved.facts["cup1 LOCATION"] == "location7"
+    assert saved.goals == scene.goals
+    with pytest.raises(confab.KnowledgeError, match=r"ends in \.ttl"):
+        scene.save(tmp_path / "saved.owl")
+
+
+def test_a_saved_scene_replaces_only_an_unedited_saved_scene(scene: confab.Scene, tmp_path: Path) -> None:
+    file = scene.save(tmp_path / "saved.ttl")
+    scene.save(file)
+    file.write_text(file.read_text(encoding="utf-8") + "# mine\n", encoding="utf-8")
+    with pytest.raises(OSError, match="which a saved scene doesn't replace"):
+        scene.save(file)
+
+
+def test_a_graph_of_rdflib_that_contains_the_imports_is_loaded(tmp_path: Path) -> None:
+    scene = confab.load("library-small")
+    scene.graph.serialize(tmp_path / "whole.ttl", format="turtle")
+    assert confab.load(tmp_path / "whole.ttl").problem.goal == scene.problem.goal
+    assert confab.load(scene.graph).plan().plan.length == scene.plan().plan.length
+
+
+def test_two_scenes_in_one_file_are_named(tmp_path: Path) -> None:
+    (tmp_path / "two.ttl").write_text(
+        "@prefix owl: <http://www.w3.org/2002/07/owl#> . <urn:a> a owl:Ontology . <urn:b> a owl:Ontology .",
+        encoding="utf-8",
+    )
+    with pytest.raises(confab.KnowledgeError, match="found 2: <urn:a>, <urn:b>"):
+        confab.load(tmp_path / "two.ttl").plan()
