@@ -97,7 +97,7 @@ def schedule(
 
     Returns
     -------
-    list of Slot
+    list of WorkerSlot
         The slots in the order of their begins.
     """
     seconds = {i: 1.0 if seconds_of is None else seconds_of[i] for i in range(len(primitives))}

@@ -72,31 +72,48 @@ def best_in_time(problem: Problem, plan: Plan, seconds: float | None = None, sho
 
 def _best(problem: Problem, plan: Plan, seconds: float | None, shorten: bool) -> Timed:
     from confab.planner.timed.sharing import evenly_shared, shared
-    from confab.planner.timed.spreading import spread
 
     until = None if seconds is None else perf_counter() + seconds
 
     def left(parts: int) -> float | None:
         return None if until is None else max(until - perf_counter(), 0.0) / parts
 
+    def enough(one: Timed) -> bool:
+        return one.plan is not None and (not shorten or evenly_shared(problem, one.plan.work, one.plan.makespan))
+
     try:
-        first = in_time(problem, spread(problem, plan) if shorten else plan, left(3))
+        first = in_time(problem, plan, left(4))
     except LimitError as limit:
         return Timed(reason=Reason(str(limit)))
-    if first.plan is not None and (not shorten or evenly_shared(problem, first.plan.work, first.plan.makespan)):
+    if shorten:
+        first = _spread(problem, plan, first, left(3))
+    if enough(first):
         return first
     half = left(2)
     other = shared(problem, plan, None if half is None else perf_counter() + half, shorten)
     if other is None:
         return first
-    found = Timed()
+    found = first
     with suppress(LimitError):
-        found = in_time(problem, spread(problem, other) if shorten else other, left(1))
-    if first.plan is None and 0 < found.late < first.late:
-        return found
-    if found.plan is None or (first.plan is not None and first.plan.makespan <= found.plan.makespan):
-        return first
-    return found
+        found = _better(first, in_time(problem, other, left(2)))
+    return _spread(problem, other, found, left(1)) if shorten else found
+
+
+def _spread(problem: Problem, plan: Plan, known: Timed, seconds: float | None) -> Timed:
+    """Return a result with the turns of a plan spread over equal values if it is better than a known result, else the known one."""
+    from confab.planner.timed.spreading import spread
+
+    with suppress(LimitError):
+        several = spread(problem, plan)
+        return known if several is plan else _better(known, in_time(problem, several, seconds))
+    return known
+
+
+def _better(one: Timed, other: Timed) -> Timed:
+    """Return the second of two results if it misses its times by less or has a smaller makespan, else the first."""
+    if one.plan is None:
+        return other if other.plan is not None or 0 < other.late < one.late else one
+    return other if other.plan is not None and other.plan.makespan < one.plan.makespan else one
 
 
 def in_time(

@@ -111,12 +111,12 @@ class Listing:
         left = [graph.in_degree(number) for number in range(len(blocks))]
         queue = [(0, -tails[number], number) for number in range(len(blocks)) if not left[number]]
         heapq.heapify(queue)
-        parked: dict[int, list[int]] = defaultdict(list)
+        parked: dict[int, set[int]] = {}
         while queue:
             _, _, number = heapq.heappop(queue)
             found = self.tried(blocks[number])
-            if isinstance(found, int):
-                parked[found].append(number)
+            if isinstance(found, set):
+                parked[number] = found
                 continue
             entry = found.end - shortest[number], -tails[number], number
             if queue and entry > queue[0]:
@@ -126,10 +126,13 @@ class Listing:
             for after in graph.successors(number):
                 left[after] -= 1
             ready = [after for after in graph.successors(number) if not left[after]]
-            ready += [one for resource in found.lines for one in parked.pop(resource, ())]
-            for one in ready:
+            changed = {*found.lines, *(resource for i in blocks[number] for resource, _ in self.turns_of[i])}
+            freed = [one for one, occupied in parked.items() if occupied & changed]
+            for one in freed:
+                del parked[one]
+            for one in (*ready, *freed):
                 heapq.heappush(queue, (0, -tails[one], one))
-        return set(parked)
+        return set().union(*parked.values())
 
     def blocks(self) -> list[list[int]]:
         """Return the blocks; the activities of a block have the order of the sequence."""
@@ -167,14 +170,14 @@ class Listing:
         for its in islice(product(*(self.of[turn] for turn in turns)), MOST_CREWS):
             yield dict(zip(turns, its, strict=True))
 
-    def tried(self, block: Sequence[int]) -> _Appended | int:
-        """Return a block with the actors with which it ends earliest, or a resource that isn't free."""
+    def tried(self, block: Sequence[int]) -> _Appended | set[int]:
+        """Return a block with the actors with which it ends earliest, or for all possible actors a resource that isn't free."""
         best: _Appended | None = None
-        occupied = -1
+        occupied = set[int]()
         for taking in self.crews(block):
             found = self.appended(block, taking)
             if isinstance(found, int):
-                occupied = found
+                occupied.add(found)
             elif best is None or found.end < best.end:
                 best = found
         return occupied if best is None else best
@@ -194,8 +197,9 @@ class Listing:
                 turn = self.order.resources[key[0]].turns[key[1]]
                 line = found.lines.setdefault(resource, self.lines[resource].copy())
                 if key not in line.open:
-                    early = resource in self.kept and len(line.taken) < key[1]
-                    if early or (line.open and not (turn.reading and all(map(self.reading, line.open)))):
+                    if self.early(key, found):
+                        return key[0]
+                    if line.open and not (turn.reading and all(map(self.reading, line.open))):
                         return resource
                     line.open[key] = len(turn.members)
                     line.taken.append(key)
@@ -214,6 +218,14 @@ class Listing:
                     else:
                         line.changed, line.read = turn.highs, ()
         return found
+
+    def early(self, turn: TurnId, found: _Appended) -> bool:
+        """Return whether a turn keeps the order of the sequence, and the turn before it hasn't begun."""
+        resource, number = turn
+        if resource not in self.kept or not number:
+            return False
+        before = self.order.resources[resource].turns[number - 1].members
+        return not any(i in found.begins or i in self.begins for i in before)
 
     def reading(self, turn: TurnId) -> bool:
         """Return whether a turn only reads."""

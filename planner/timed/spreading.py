@@ -8,67 +8,115 @@ in the sequence. The plan checker judges the result.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
-from confab.planner.plan import Plan
+from confab.planner.plan import Plan, Step
 from confab.planner.timed.activities import InapplicableError, activities, in_sequence
 from confab.planner.timed.exchange import exchanged, possible
-from confab.planner.timed.order import order_of
+from confab.planner.timed.order import Order, order_of
 from confab.planner.validation import BehaviorReader, LoggedState, validate
 from confab.reasoner.symbols import Problem
+
+
+@dataclass(frozen=True)
+class _ValueTurn:
+    """A turn at a value in the sequence: the first and the last step, and the steps that name the value."""
+
+    first: int
+    last: int
+    naming: tuple[int, ...]
+
+    def meets(self, other: _ValueTurn) -> bool:
+        """Return whether two spans have a common part."""
+        return self.first <= other.last and other.first <= self.last
 
 
 def spread(problem: Problem, plan: Plan) -> Plan:
     """Return a plan with the same behaviours, in which the turns at looked-up values are spread over equal values.
 
-    Return the given plan if the checker doesn't accept the result.
+    Return the given plan if no turn has another value, or if the checker doesn't accept the result.
     """
     steps = plan.primitives
     try:
         order = order_of(problem, activities(problem, steps, in_sequence(steps)), in_sequence(steps))
     except InapplicableError:
         return plan
-    rules, facts = BehaviorReader(problem), LoggedState(problem, problem.initial)
-    every = {step.path: step for step in plan.walk()}
-    above = [[every[step.path[:depth]] for depth in range(1, len(step.path) + 1)] for step in steps]
-    naming: dict[str, list[int]] = defaultdict(list)
+    naming = _naming(steps)
+    renamed = _renamed(problem, plan, naming, _spans(order, naming))
+    if not renamed:
+        return plan
+    new = exchanged(problem, plan, renamed)
+    return plan if validate(problem, new) else new
+
+
+def _naming(steps: Sequence[Step]) -> Mapping[str, Sequence[int]]:
+    """Return the numbers of the steps that name each individual."""
+    found: dict[str, list[int]] = defaultdict(list)
     for number, step in enumerate(steps):
         for one in dict.fromkeys((*step.arguments, *step.bindings.values())):
-            naming[one].append(number)
-    used = {value for state in (problem.initial, problem.goal) for value in state.values()}
-    used |= {one for symbol in (*problem.initial, *problem.goal) for one in symbol.arguments}
-    kinds = {one: {kind for kind, its in problem.classes.items() if one in its} for one in naming}
-    looked = {one.value: one.turns for one in order.resources if one.value is not None and one.value in naming}
-    spans: dict[str, list[tuple[int, int, list[int]]]] = defaultdict(list)
-    for value, turns in looked.items():
-        last = -1
-        for turn in (one for one in turns if not one.reading):
-            end = max(turn.members)
-            its = [number for number in naming[value] if last < number <= end]
-            spans[value].append((min([*turn.members, *its]), end, its))
-            last = end
-    taken = {value: [(first, end) for first, end, _ in its] for value, its in spans.items()}
-    renamed: dict[int, Mapping[str, str]] = {}
-    for value, turns_of_value in spans.items():
-        free = [
-            other
-            for other in dict.fromkeys(one for kind in sorted(kinds[value]) for one in problem.classes[kind])
-            if other not in used
-            and (other in looked or other not in naming)
-            and all(other in problem.classes[kind] for kind in kinds[value])
-        ]
-        for first, end, its in turns_of_value:
-            taken[value].remove((first, end))
-            upper = {step.path: step for number in its for step in above[number]}
-            able = [
+            found[one].append(number)
+    return found
+
+
+def _spans(order: Order, naming: Mapping[str, Sequence[int]]) -> dict[str, list[_ValueTurn]]:
+    """Return the spans at each looked-up value that steps name.
+
+    A span begins with the first step that names the value after the turn before.
+    """
+    found: dict[str, list[_ValueTurn]] = {}
+    for resource in order.resources:
+        value = resource.value
+        if value is None or value not in naming:
+            continue
+        found[value], before = [], -1
+        for turn in resource.turns:
+            if not turn.reading:
+                last = max(turn.members)
+                its = tuple(number for number in naming[value] if before < number <= last)
+                found[value].append(_ValueTurn(min(*turn.members, *its), last, its))
+                before = last
+    return found
+
+
+def _renamed(
+    problem: Problem, plan: Plan, naming: Mapping[str, Sequence[int]], spans: Mapping[str, Sequence[_ValueTurn]]
+) -> Mapping[int, Mapping[str, str]]:
+    """Return the new value in place of each replaced value, by the number of the step.
+
+    Each span takes the value that has the fewest spans so far, of the values that are possible and free during the span.
+    """
+    steps = {step.path: step for step in plan.walk()}
+    above = [[steps[step.path[:depth]] for depth in range(1, len(step.path) + 1)] for step in plan.primitives]
+    rules, facts = BehaviorReader(problem), LoggedState(problem, problem.initial)
+    taken: dict[str, list[_ValueTurn]] = defaultdict(list, {value: list(its) for value, its in spans.items()})
+    renamed: dict[int, dict[str, str]] = defaultdict(dict)
+    for value, its in spans.items():
+        equal = [one for one in _equal(problem, value) if one in spans or one not in naming]
+        for span in its:
+            taken[value].remove(span)
+            upper = {step.path: step for number in span.naming for step in above[number]}.values()
+            free = (
                 other
-                for other in sorted(free, key=lambda one: len(taken.setdefault(one, [])))
-                if all(after < first or end < before for before, after in taken[other])
-                and all(possible(problem, rules, facts, step, {value: other}) for step in upper.values())
-            ]
-            chosen = able[0] if able else value
-            taken[chosen].append((first, end))
+                for other in sorted(equal, key=lambda one: len(taken[one]))
+                if not any(map(span.meets, taken[other]))
+                and all(possible(problem, rules, facts, step, {value: other}) is not None for step in upper)
+            )
+            chosen = next(free, value)
+            taken[chosen].append(span)
             if chosen != value:
-                renamed |= {number: {**renamed.get(number, {}), value: chosen} for number in its}
-    new = exchanged(problem, plan, renamed) if renamed else plan
-    return plan if validate(problem, new) else new
+                for number in span.naming:
+                    renamed[number][value] = chosen
+    return renamed
+
+
+def _equal(problem: Problem, value: str) -> list[str]:
+    """Return the individuals of the same classes as a value that neither the initial state nor the goal names."""
+    facts = (*problem.initial.items(), *problem.goal.items())
+    used = {one for symbol, its in facts for one in (its, *symbol.arguments)}
+    kinds = [kind for kind in problem.classes if value in problem.members(kind)]
+    return [
+        one
+        for one in problem.classes.get(min(kinds, default=""), ())
+        if one not in used and all(one in problem.members(kind) for kind in kinds)
+    ]

@@ -72,6 +72,52 @@ def test_hands_pass_cups_in_both_directions_without_waiting_for_places() -> None
     assert several.makespan < one.makespan <= one.serial * Fraction(3, 4)
 
 
+BASINS = '''
+@prefix : <https://example.org/basins#> .
+@prefix c: <https://w3id.org/confab/core#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+@prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
+<https://example.org/basins> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> ; c:symbolicOnly true .
+:Arm a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object .
+:Place a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object .
+:Basin a owl:Class, owl:NamedIndividual ; rdfs:subClassOf :Place .
+:Cup a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object ; c:hasSituationType :AT, :CLEAN .
+:AT a owl:Class, owl:NamedIndividual, c:SituationType ; c:valueProperty :at .
+:Place rdfs:subClassOf :AT .
+:at a owl:ObjectProperty, owl:FunctionalProperty, owl:NamedIndividual ; rdfs:domain :Cup ; rdfs:range :AT .
+:CLEAN a owl:Class, owl:NamedIndividual, c:SituationType .
+:rent a owl:DatatypeProperty, owl:NamedIndividual, c:Relation ; rdfs:domain :Basin ; rdfs:range xsd:decimal .
+:SOAK a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 1 ; c:actor :SOAK.arm ; c:price :SOAK.rent ;
+  c:duration "PT2S"^^xsd:dayTimeDuration ; c:update """
+  DELETE { ?cup :at :table } INSERT { ?cup :at ?basin }
+  WHERE { ?cup a :Cup . ?arm a :Arm . ?basin a :Basin . ?cup :at :table FILTER NOT EXISTS { ?other a :Cup ; :at ?basin } }""" .
+:DRY a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 2 ; c:actor :DRY.arm ;
+  c:duration "PT2S"^^xsd:dayTimeDuration ; c:update """
+  DELETE { ?cup :at ?basin } INSERT { ?cup :at :table ; :CLEAN true }
+  WHERE { ?cup a :Cup . ?arm a :Arm . ?basin a :Basin . ?cup :at ?basin }""" .
+:SOAK.rent a owl:NamedIndividual, c:Calculation ; c:relation :rent ; c:about :SOAK.basin .
+:SOAK.arm a owl:NamedIndividual . :DRY.arm a owl:NamedIndividual . :SOAK.basin a owl:NamedIndividual .
+:table a :Place, owl:NamedIndividual .
+:basin1 a :Basin, owl:NamedIndividual ; :rent 1.0 . :basin2 a :Basin, owl:NamedIndividual ; :rent 100.0 .
+:cup1 a :Cup, owl:NamedIndividual ; :at :table . :cup2 a :Cup, owl:NamedIndividual ; :at :table .
+'''
+"""Cups are soaked in a basin each, and dried; the second basin is a hundred times as dear."""
+
+
+@pytest.mark.parametrize(("arms", "makespan", "cost"), [(["arm1"], 8, 4), (["arm1", "arm2"], 4, 103)])
+def test_a_dearer_place_is_used_only_if_this_shortens_the_makespan(
+    tmp_path: Path, arms: list[str], makespan: int, cost: int
+) -> None:
+    every = ("table", "basin1", "basin2", "cup1", "cup2", *arms)
+    own = "".join(f":{arm} a :Arm, owl:NamedIndividual .\n" for arm in arms)
+    different = f"[] a owl:AllDifferent ; owl:distinctMembers ( {' '.join(f':{one}' for one in every)} ) ."
+    (tmp_path / "basins.ttl").write_text(BASINS + own + different)
+    result = confab.load(tmp_path / "basins.ttl").plan(["cup1 CLEAN true", "cup2 CLEAN true"], minimise="makespan")
+    assert result.timed is not None
+    assert [float(result.timed.makespan), result.cost] == [makespan, cost]
+
+
 def test_every_step_spans_its_refinement() -> None:
     intervals = served().intervals
     for step in served().plan.walk():
