@@ -4,12 +4,13 @@
     CONFAB_COUNT=1000 …  runs, a tenth of them on tables
     CONFAB_SEED=1 …      the first seed
 
-Groups: tables with two, four and eight hands, deliveries by three mobile robots of different speeds, random timed worlds, and
-random timed worlds with deadlines and windows. On tables and in deliveries, half of the goals have a deadline, 5 % after the
-time at which the plan achieves them. The independent checker judges every execution. A clairvoyant schedule knows the actual
-durations; it has the same steps, may exchange turns and actors, and is judged by the checker too. The planned order is the order
-of turns in the timed plan. A run is held back if a remaining primitive can't begin such that its end is in time for all durations
-within the deviation; only completed runs are late.
+Groups: shipped scenes whose plans have overlapping steps, and at most 100 of them; tables with two, four and eight hands;
+deliveries by three mobile robots of different speeds; random timed worlds; and random timed worlds with deadlines and windows. In
+scenes and on tables, each behaviour has a random duration. In the first three groups, half of the goals have a deadline, 5 % after
+the time at which the plan achieves them; the plan was made without these deadlines. The independent checker judges every execution.
+A clairvoyant schedule knows the actual durations; it has the same steps, may exchange turns and actors, and is judged by the
+checker too. The planned order is the order of turns in the timed plan. A run is held back if a remaining primitive can't begin such
+that its end is in time for all durations within the deviation; only completed runs are late.
 """
 
 from __future__ import annotations
@@ -32,14 +33,18 @@ from confab.planner.timed.plan import TimedPlan
 from confab.planner.timed.schedules import ActorChoices, durations_with, least, shortest, turn_edges
 from confab.planner.timed.validation import validate_timed
 from confab.planner.validation import BehaviorReader, LoggedState
+from confab.reasoner.graph.knowledge import load
+from confab.reasoner.reading.problem import read
 from confab.reasoner.symbols import Problem, Symbol, Times
 from confab.reasoner.timing import only_during
+from confab.scene import scenes
 from worlds.deliveries import deliveries
 from worlds.families import family
 from worlds.timed import problem_of, timed_world
 
 SPREAD = Fraction(3, 10)
-RUNS_OF_A_PLAN = 25
+RUNS_OF_A_SCENE, RUNS_OF_A_PLAN = 10, 25
+LARGEST = 100
 FAMILIES = ("served", "swap", "handover", "blocked")
 
 
@@ -69,9 +74,10 @@ def main() -> None:
     )
     print(f"| {' | '.join(columns)} |\n{'|---' * len(columns)}|")
     for name, share, plans, each in (
+        ("scenes", 2, _scenes(first), RUNS_OF_A_SCENE),
         ("tables", 1, _tables(first), RUNS_OF_A_PLAN),
-        ("deliveries", 3, _deliveries(first), RUNS_OF_A_PLAN),
-        ("random", 3, _random(first, False), 1),
+        ("deliveries", 2, _deliveries(first), RUNS_OF_A_PLAN),
+        ("random", 2, _random(first, False), 1),
         ("random, limited", 3, _random(first, True), 1),
     ):
         figures, number, most = Figures(), 0, count * share // 10
@@ -94,20 +100,32 @@ def _mean(ratios: list[float]) -> str:
     return f"{exp(sum(map(log, ratios)) / len(ratios)):.3f}, at most {max(ratios):.2f}" if ratios else ""
 
 
+def _scenes(first: int) -> Iterator[tuple[Problem, TimedPlan]]:
+    for seed in range(first, first + 1_000):
+        for name in scenes():
+            rng = Random(f"{seed} {name}")
+            for problem, timed in _planned(_with_durations(read(load(name)).problem, rng), rng):
+                if len(timed.slots) <= LARGEST and timed.makespan < timed.serial:
+                    yield problem, timed
+
+
 def _tables(first: int) -> Iterator[tuple[Problem, TimedPlan]]:
     for seed in range(first, first + 1_000):
         for hands, n in ((2, 4), (4, 8), (8, 12)):
             rng = Random(f"{seed} {hands}")
-            problem = family(FAMILIES[seed % len(FAMILIES)], n, seed, hands)
-            lowest = problem.domain.at_level(problem.domain.levels[-1])
-            times = Times(measured={one.name: Fraction(rng.randint(2, 8), 2) for one in lowest})
-            yield from _planned(replace(problem, times=times), rng)
+            yield from _planned(_with_durations(family(FAMILIES[seed % len(FAMILIES)], n, seed, hands), rng), rng)
 
 
 def _deliveries(first: int) -> Iterator[tuple[Problem, TimedPlan]]:
     for seed in range(first, first + 1_000):
         for n in (6, 9, 12):
             yield from _planned(deliveries(n, 3, seed), Random(f"{seed} {n}"))
+
+
+def _with_durations(problem: Problem, rng: Random) -> Problem:
+    """Return a problem in which each primitive has a random duration."""
+    lowest = problem.domain.at_level(problem.domain.levels[-1])
+    return replace(problem, times=Times(measured={one.name: Fraction(rng.randint(2, 8), 2) for one in lowest}))
 
 
 def _planned(problem: Problem, rng: Random) -> Iterator[tuple[Problem, TimedPlan]]:
@@ -150,7 +168,7 @@ def _run(problem: Problem, timed: TimedPlan, rng: Random, figures: Figures) -> N
     counts = figures.counts
     factors = [Fraction(rng.randint(700, 1300), 1000) for _ in timed.slots]
     dispatch = Dispatch(problem, timed, SPREAD)
-    planned = Dispatch(problem, timed, SPREAD)
+    planned = Dispatch(problem, timed)
     run = simulated(dispatch, lambda i, seconds: seconds * factors[i])
     untimed = replace(problem, times=Times(events=problem.times.events) if problem.times else None)
     if run.timed is None:
@@ -195,10 +213,10 @@ def _hindsight(planned: Dispatch, factors: list[Fraction]) -> tuple[bool, bool, 
     }
     choices = ActorChoices(planned.choices.of, lasts)
     same = earliest(network, turn_edges(order, planned.turns))
-    assert same is not None
     events = planned.problem.times.events if planned.problem.times else {}
     untimed = replace(planned.problem, times=Times(events=events))
-    bound, costs = least(order, network, choices), same.cost
+    bound = least(order, network, choices)
+    costs: tuple[float, float] = (inf, inf) if same is None else same.cost
     while (best := shortest(order, network, choices, inf, bound)) is not None:
         lasting = replace(network, durations=durations_with(network, choices, best.turns))
         no_more = ActorChoices({}, {key: {} for key in choices.lasts})
@@ -210,4 +228,6 @@ def _hindsight(planned: Dispatch, factors: list[Fraction]) -> tuple[bool, bool, 
         if not moved:
             break
         choices = replace(choices, of={turn: able for turn, able in choices.of.items() if turn not in moved})
-    return not same.late, not costs[0], costs[1] * network.unit, bound * network.unit
+    keeps = not costs[0]
+    makespan = Fraction(costs[1]) * network.unit if keeps else Fraction(0)
+    return same is not None and not same.late, keeps, makespan, bound * network.unit

@@ -3,8 +3,9 @@
 A primitive begins when all events that must precede its begin have happened, and the time windows of its individuals allow the
 begin. So a delay shifts only the primitives that depend on the late primitive. The end of a primitive isn't controlled. If an end
 must follow another event, the primitive begins only if this order holds for all durations within the stated spread; otherwise the
-primitive is held back. When a primitive ends earlier or later than expected, actors' turns that haven't begun are exchanged to keep
-deadlines and to shorten the makespan.
+primitive is held back. Before the first begin, and when a primitive ends earlier or later than expected, actors' turns that haven't
+begun are exchanged: to keep deadlines, to keep deadlines also with the longest durations within the spread, and to shorten the
+makespan.
 
 Networks whose durations are observed, not controlled, are described by Vidal and Fargier, "Handling contingency in temporal
 constraint networks", Journal of Experimental and Theoretical Artificial Intelligence 11 (1999).
@@ -14,7 +15,7 @@ from __future__ import annotations
 
 import heapq
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import ceil, floor, inf
@@ -85,6 +86,8 @@ class Dispatch:
         self.begun: dict[int, int] = {}
         self.over: dict[int, int] = {}
         self._settle()
+        if self.controlled and self.order.latest and spread:
+            self._exchange(0)
 
     def step(self, number: int) -> Step:
         """Return a primitive with the actors that are assigned to it."""
@@ -118,7 +121,7 @@ class Dispatch:
         self.begun[number] = self._units(now)
 
     def end(self, number: int, now: Fraction) -> None:
-        """Report the end of a primitive; at an unexpected end, actors' turns that haven't begun may be exchanged."""
+        """Report the end of a primitive; after an unexpected duration, turns that haven't begun may be exchanged."""
         time = self.over[number] = self._units(now)
         if self.controlled and time - self.begun[number] != self.lasts[number]:
             self._exchange(time)
@@ -242,7 +245,7 @@ class Dispatch:
     # ------------------------------------------------------------------------------------------------------- exchanges
 
     def _exchange(self, time: int) -> None:
-        """Exchange actors' turns that haven't begun if this keeps more deadlines or shortens the makespan."""
+        """Exchange turns that haven't begun for less lateness, less lateness with the longest durations, or a shorter makespan."""
         fixed = {
             turn
             for line in self.turns
@@ -250,20 +253,36 @@ class Dispatch:
             if any(m in self.begun for m in self.order.resources[turn[0]].turns[turn[1]].members)
         }
         known = {m for turn in fixed for m in self.order.resources[turn[0]].turns[turn[1]].members}
-        lasts, begins = self._expected(time)
-        base = [lasts[i] if i in known else its for i, its in enumerate(self.network.durations)]
-        network = replace(self._rest(time, self.network.edges), durations=base)
-        choices = ActorChoices(
-            {turn: able for turn, able in self.choices.of.items() if turn not in fixed},
-            {key: {} if key[0] in fixed else its for key, its in self.choices.lasts.items()},
-        )
-        found = rescheduled(self.order, network, choices, self.turns, fixed, WORK)
-        if found is None or found.begins.cost >= begins.cost:
+        before = CandidateSchedule(self.turns, self._expected(time)[1])
+        network, choices = self._open(time, fixed, known)
+        slow = None
+        if self.spread and (self.order.latest or self.order.windows):
+            before.slow, slow = self._expected(time, self.spread)[1], self._open(time, fixed, known, self.spread)
+        found = rescheduled(self.order, network, choices, self.turns, fixed, WORK, slow)
+        if found is None or found.cost >= before.cost:
             return
         plan = self._plan(found, durations_with(network, choices, found.turns))
         if plan is not None and not validate_timed(self._untimed, plan, executed=True):
             self.turns = found.turns
             self._settle()
+
+    def _open(
+        self, time: int, fixed: Container[TurnId], known: Container[int], more: Fraction = Fraction(0)
+    ) -> tuple[Network, ActorChoices]:
+        """Return the rest of the network and the choices of actors if the remaining durations deviate by the factor 1 + `more`.
+
+        The `known` primitives belong to the `fixed` turns, which keep their actors.
+        """
+        lasts = self._lasting(time, more)
+        base = [lasts[i] if i in known else ceil(its * (1 + more)) for i, its in enumerate(self.network.durations)]
+        choices = ActorChoices(
+            {turn: able for turn, able in self.choices.of.items() if turn not in fixed},
+            {
+                key: {} if key[0] in fixed else {i: ceil(each * (1 + more)) for i, each in its.items()}
+                for key, its in self.choices.lasts.items()
+            },
+        )
+        return replace(self._rest(time, self.network.edges), durations=base), choices
 
     def _plan(self, found: CandidateSchedule, lasts: Sequence[int]) -> TimedPlan | None:
         """Return the plan with the begins of a schedule and with the given durations."""

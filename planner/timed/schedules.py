@@ -39,15 +39,24 @@ class ActorChoices:
 
 @dataclass
 class CandidateSchedule:
-    """The order of the turns of each resource, and the begins of activities that follow from this order."""
+    """The order of the turns of each resource, and the begins of activities that follow from this order.
+
+    `slow` are the begins with the longest durations, or None if durations are certain.
+    """
 
     turns: list[list[TurnId]]
     begins: Begins
+    slow: Begins | None = None
 
     @property
     def makespan(self) -> int:
         """The end of the last activity."""
         return self.begins.makespan
+
+    @property
+    def cost(self) -> tuple[int, int, int]:
+        """The value to be minimised: first the lateness, then the lateness with the longest durations, then the makespan."""
+        return self.begins.late, 0 if self.slow is None else self.slow.late, self.begins.makespan
 
 
 def shortest(
@@ -73,7 +82,7 @@ def shortest(
     found = [start for start in starts if start is not None]
     if not found:
         return None
-    return search.improved(min(found, key=lambda one: one.begins.cost), until, bound)
+    return search.improved(min(found, key=lambda one: one.cost), until, bound)
 
 
 def rescheduled(
@@ -83,6 +92,7 @@ def rescheduled(
     turns: Sequence[Sequence[TurnId]],
     fixed: Container[TurnId],
     work: int,
+    slow: tuple[Network, ActorChoices] | None = None,
 ) -> CandidateSchedule | None:
     """Return the best schedule that exchanges of turns find from a given order of turns, or None if the order has no schedule.
 
@@ -97,8 +107,10 @@ def rescheduled(
         Turns that keep their actors and their places in the order.
     work : int
         Maximum number of arcs that the exchanges process.
+    slow : (Network, ActorChoices), optional
+        The network and the choices with the longest durations.
     """
-    search = _ScheduleSearch(order, network, choices, fixed, work)
+    search = _ScheduleSearch(order, network, choices, fixed, work, slow)
     start = search.evaluated([list(line) for line in turns])
     return None if start is None else search.improved(start, inf, 0)
 
@@ -138,8 +150,10 @@ class _ScheduleSearch:
         choices: ActorChoices,
         fixed: Container[TurnId] = (),
         work: int = MOST_ARCS,
+        slow: tuple[Network, ActorChoices] | None = None,
     ) -> None:
         self.order, self.network, self.choices, self.fixed, self.work = order, network, choices, fixed, work
+        self.slow = slow
         self.turns_of: list[list[TurnId]] = [[] for _ in order.activities]
         for resource, one in enumerate(order.resources):
             for number, turn in enumerate(one.turns):
@@ -148,9 +162,13 @@ class _ScheduleSearch:
 
     def evaluated(self, turns: list[list[TurnId]]) -> CandidateSchedule | None:
         """Return the schedule for an order of turns, or None if the order has no schedule."""
-        durations = durations_with(self.network, self.choices, turns)
-        begins = earliest(self.network, turn_edges(self.order, turns), durations)
-        return None if begins is None else CandidateSchedule(turns, begins)
+        begins = self.begins(turns, self.network, self.choices)
+        slow = None if begins is None or self.slow is None else self.begins(turns, *self.slow)
+        return None if begins is None else CandidateSchedule(turns, begins, slow)
+
+    def begins(self, turns: list[list[TurnId]], network: Network, choices: ActorChoices) -> Begins | None:
+        """Return the earliest begins for an order of turns, or None if the order has no schedule."""
+        return earliest(network, turn_edges(self.order, turns), durations_with(network, choices, turns))
 
     def starts(self) -> Iterator[list[list[TurnId]]]:
         """Yield the orders of turns that lead to the first schedules: the order of the sequence, and list scheduling."""
@@ -162,26 +180,28 @@ class _ScheduleSearch:
     def improved(self, best: CandidateSchedule, until: float, bound: int) -> CandidateSchedule:
         """Return the best schedule after exchanges of turns on the critical path."""
         now, barren = best, 0
-        left = self.work // (1 + len(self.network.edges) + len(self.network.durations))
+        left = (
+            self.work // (1 + len(self.network.edges) + len(self.network.durations)) // (1 if self.slow is None else 2)
+        )
         tabu: dict[tuple[TurnId, TurnId], int] = {}
         step = 0
-        while best.begins.cost > (0, bound) and barren < ROUNDS and left > 0 and perf_counter() < until:
+        while best.cost > (0, 0, bound) and barren < ROUNDS and left > 0 and perf_counter() < until:
             step += 1
             barren += 1
-            options: list[tuple[tuple[int, int], int, tuple[TurnId, TurnId], CandidateSchedule]] = []
+            options: list[tuple[tuple[int, int, int], int, tuple[TurnId, TurnId], CandidateSchedule]] = []
             for pair, turns in self.neighbours(now):
                 left -= 1
                 if left < 0 or perf_counter() > until:
                     break
                 other = self.evaluated(turns)
-                if other is None or (tabu.get(pair, 0) > step and other.begins.cost >= best.begins.cost):
+                if other is None or (tabu.get(pair, 0) > step and other.cost >= best.cost):
                     continue
-                options.append((other.begins.cost, len(options), pair, other))
+                options.append((other.cost, len(options), pair, other))
             if not options:
                 break
             _, _, pair, now = min(options)[:4]
             tabu[pair[1], pair[0]] = step + TABU
-            if now.begins.cost < best.begins.cost:
+            if now.cost < best.cost:
                 best, barren = now, 0
         return best
 
@@ -234,14 +254,17 @@ class _ScheduleSearch:
 
         The last activity comes first.
         """
-        durations = durations_with(self.network, self.choices, now.turns)
-        ends = [b + d for b, d in zip(now.begins.begins, durations, strict=True)]
-        found, current = list[int](), now.begins.latest
+        begins, network, choices = now.begins, self.network, self.choices
+        if not begins.late and now.slow is not None and now.slow.late and self.slow is not None:
+            begins, network, choices = now.slow, *self.slow
+        durations = durations_with(network, choices, now.turns)
+        ends = [b + d for b, d in zip(begins.begins, durations, strict=True)]
+        found, current = list[int](), begins.latest
         if current < 0:
-            current = max(range(len(ends)), key=lambda i: (self.network.at[i] is None, ends[i]))
+            current = max(range(len(ends)), key=lambda i: (network.at[i] is None, ends[i]))
         while current >= 0 and current not in found:
             found.append(current)
-            current = now.begins.waits_for[current]
+            current = begins.waits_for[current]
         return found
 
 
