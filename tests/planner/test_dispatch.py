@@ -98,3 +98,20 @@ def test_a_missed_deadline_is_reported_as_soon_as_it_is_certain() -> None:
     assert late.goal == goal
     assert late.certain
     assert simulated(dispatch, lambda i, seconds: seconds).said == {goal: 0}
+
+
+@pytest.mark.parametrize(("spread", "late"), [(Fraction(0), True), (SPREAD, False)])
+def test_turns_are_exchanged_for_a_deadline_that_the_longest_durations_miss(spread: Fraction, late: bool) -> None:
+    problem, timed = served()
+    strict = replace(problem, times=Times(deadlines={Symbol("BEVERAGE", ("cup1",)): Fraction(12)}))
+    run = simulated(Dispatch(strict, timed, spread), lambda i, seconds: seconds * (1 + SPREAD))
+    assert run.timed is not None
+    assert [bool(run.said), validate_timed(strict, run.timed, executed=True) != []] == [late, late]
+
+
+def test_a_deadline_that_the_longest_durations_keep_changes_nothing() -> None:
+    problem, timed = served()
+    loose = replace(problem, times=Times(deadlines={Symbol("BEVERAGE", ("cup1",)): Fraction(15)}))
+    run = simulated(Dispatch(loose, timed, SPREAD), lambda i, seconds: seconds)
+    assert run.timed is not None
+    assert run.timed.makespan == timed.makespan
