@@ -129,7 +129,8 @@ SCENE = {
     "simulate_action transition",
     "explain": "why why_not justify explanation reasons explain_plan because whynot why_unsolvable diagnose "
     "why_no_plan explain_unsolvable",
-    "objects": "individuals all_objects instances things entities get_objects instances_of objects_of_type "
+    "objects": "world_objects worldobjects individuals all_objects instances things entities get_objects instances_of "
+    "objects_of_type "
     "nodes_of_type members subjects_of items object user_objects get_instances names_of_objects constants "
     "list_objects bodies search_objects get_individual get_object find_object object_names names_of",
     "facts": "head start_state perceive sense "
@@ -162,7 +163,8 @@ SCENE = {
     "read_result(FILE)": "load_result open_result read_plan_result result_from_file explain_plan_file",
     "read_plan(FILE)": "load_plan open_plan parse_plan from_plan plan_from_file plan_from_json",
     "with_episodes(FILE)": "add_episode add_episodes load_history history episodes log",
-    "affordances": "afforded afford possible_actions applicable applicable_actions legal_actions available_actions "
+    "affordances": "ground_operator ground_operators ground_actions ground_behaviors groundings afforded afford "
+    "possible_actions applicable applicable_actions legal_actions available_actions "
     "valid_actions action_mask get_legal_actions get_applicable_actions successors can can_do is_applicable "
     "possible feasible_actions applicable_operators reachable is_reachable get_affordances affords what_can_i_do "
     "actions_for options find_actions",
@@ -269,8 +271,8 @@ RESULT = {
     "outcome.forgone": "forgone soft_goals unmet violated preferences unmet_goals unsatisfied",
     "problem.initial": "initial_state initial facts init state_before start_state",
     "faults(PLAN)": "errors problems violations check_faults is_valid_plan check_plan_for",
-    "execute().episode.observed": "final_state end_state states state_after trajectory state_trajectory "
-    "state_sequence goal_state_reached state_history",
+    "execute().episode.observed": "final_state end_state state_after goal_state_reached",
+    "execute().episode.course": "states trajectory state_trajectory state_sequence state_history",
     "plan.walk()": "walk_steps walk all_steps iterate traverse",
     "goals": "goals_met goal goal_facts tasks",
     "dearer()": "warnings warning hints suggestions cheaper is_cheapest",
@@ -287,7 +289,8 @@ PLAN = {
     "total_steps shape n_levels num_levels levels_count step_count",
     "walk()": "iter traverse all_steps visit descendants dfs preorder iterate all_actions flatten_all recursive "
     "every_step iter_steps",
-    "to_networkx()": "graph networkx to_graph nx digraph tree edges dag as_graph hierarchy",
+    "to_networkx()": "graph networkx to_graph nx digraph tree successors predecessors neighbors neighbours adjacency adj "
+    "in_edges out_edges edges dag as_graph hierarchy",
     "to_dot()": "dot graphviz to_graphviz draw plot render pydot png visualize visualise figure image",
     "to_dataframe()": "dataframe df to_pandas table to_table pandas",
     "json()": "to_json to_dict as_dict dict dumps serialize data as_json to_yaml asdict jsonable",
@@ -328,8 +331,8 @@ PLAN = {
     "plan[0]": "first head first_step root_step",
     "plan[NUMBER]": "at nth item get_step step_at step_number getitem",
     "[step for step in plan.walk() if …]": "filter where select find_all search steps_of query",
-    "result.execute().episode.observed": "final_state states end_state state_after trajectory state_sequence "
-    "resulting_state outcome_state",
+    "result.execute().episode.observed": "final_state end_state state_after resulting_state outcome_state",
+    "result.execute().episode.course": "states trajectory state_sequence",
     "scene.facts": "initial_state initial start_state init",
     "step in plan": "contains has includes is_in has_step",
 }
@@ -386,15 +389,15 @@ EXECUTION = {
     "episode.failures": "failures errors faults failed problems exceptions failed_steps failed_actions failure error",
     "episode.interventions": "interventions disturbances perturbations surprises changes_of_the_world interrupts "
     "was_interrupted interrupted",
-    "episode.status": "status state outcome reason return_code final_status",
+    "episode.status": "status outcome reason return_code final_status",
     "json()": "to_json to_dict as_dict dict dumps serialize serialise data asdict as_json",
     "report": "html show page to_html render plot view visualise visualize video display draw replay write_report "
     "film animate save_video dashboard movie picture",
     "save": "dump write to_file store export persist save_json save_as write_ttl to_ttl save_episode",
     "summary()": "describe explain message text info stats statistics print pretty to_string metrics string str",
     "scene.read_episode(FILE)": "load from_file open read from_json parse loads",
-    "episode.observed": "final_state end_state last_state state_after current_state final_facts facts final "
-    "robot_states robot_state state_of final_observations",
+    "episode.observed": "state final_state end_state last_state state_after current_state final_facts facts final "
+    "robot_states robot_state joint_states joint_state get_joint_states state_of final_observations",
     "graph()": "networkx to_networkx to_graph nx tree to_dot dot digraph",
     "scene.execute()": "resume continue_ restart run step again rerun execute repeat reset retry",
     "memory.learn(scene, execution)": "learn remember train memory teach",
@@ -402,7 +405,7 @@ EXECUTION = {
     "episode.seconds": "seconds time duration elapsed runtime total_time wall_time",
     "result.cost": "cost reward total_reward total_cost score return_ returns",
     "plan.length": "length num_steps n_steps size len count",
-    "scene.execute(world=WORLD)": "world simulator env environment backend robot",
+    "scene.execute(world=WORLD)": "world simulator env environment backend robot simulate step_simulation simulation",
     "episode.reasons": "failure_reason why_failed error_message why",
 }
 REPORT = {
@@ -446,7 +449,8 @@ MEMORY = {
     "to_pandas df items all size len length num_episodes n_episodes records num_rules summary describe info data "
     "count to_json to_dict json probability probabilities likelihood confidence cogency is_empty scenes entries_of "
     "links_of print_table",
-    "advice()": "rules advise suggest suggestions recommend preferences weights learned what_learned insights "
+    "advice()": "rules advise suggest suggestions recommend preferences weights learned what_learned insights get_params "
+    "get_parameters coef_ params "
     "predict policy best model get_rules parameters coefficients",
     "confab.Memory.of(SCENE) (a new memory)": "clear reset forget wipe delete erase remove empty_out unlearn drop "
     "prune forget_all",
@@ -454,6 +458,7 @@ MEMORY = {
     "scene.plan(memory=memory)": "plan solve use apply query search guide rank",
     "page()": "html report visualise visualize plot to_html draw view display dashboard",
     "copy.deepcopy(memory)": COPY,
+    "confab.practise(scene, memory)": "score evaluate benchmark cross_val_score learning_curve test performance",
     "table().csv()": "export_csv to_csv csv save_csv",
     "trust(REPLICAS)": "trust_all trusted",
 }
@@ -532,7 +537,8 @@ OUTCOME = {
 EPISODE = {
     "done": "steps actions executed plan executed_steps performed trace",
     "planned": "original_plan first_plan initial_plan",
-    "events": "log history observations records timeline trajectory",
+    "events": "log history observations records timeline",
+    "course": "trajectory states state_history",
     "observed": "final_state state end_state final last_state",
     "initial": "initial_state start_state init",
     "status": "success succeeded reached result solved done_status outcome",
@@ -637,7 +643,8 @@ COMMANDS = {
 }
 """The names of the commands, each with other words for it."""
 OPTIONS = {
-    "time_limit seconds": "timeout max_time deadline limit time max_seconds time_out budget t duration "
+    "time_limit seconds": "max_expansions max_nodes node_limit expansion_limit max_evaluations max_iterations timeout "
+    "max_time deadline limit time max_seconds time_out budget t duration "
     "max_planning_time overall_time_limit search_time_limit max_runtime wall_time seconds sec timelimit",
     "rollouts": "trials runs n episodes repeat num_rollouts iterations times samples n_rollouts num_episodes "
     "repetitions repeats n_episodes tries attempts n_trials k num_trials",
@@ -651,7 +658,7 @@ OPTIONS = {
     "filename file_name",
     "report": "html page visualize visualise web show_html view render plot html_report show open pretty browser",
     "video": "film movie record record_video mp4 save_video video_file animation gif capture",
-    "gui": "render viewer window show display visualise visualize human headless gui_on interactive use_gui "
+    "gui watch": "render viewer window show display visualise visualize human headless gui_on interactive use_gui "
     "render_mode",
     "goals goal": "target task objective goal_state set_goal targets new_goal want desired goal_facts tasks to_achieve",
     "memory": "experience knowledge model learned mem use_memory memory_file with_memory checkpoint weights "

@@ -120,8 +120,8 @@ class Labels:
         return said(condition, lambda what: self.fact(what) if isinstance(what, Fact) else self.placed(what))
 
     def step(self, step: Step) -> str:
-        """Return a step as a sentence, or the sentences of steps that are refined together."""
-        return "; ".join(map(self._of_step, step.together))
+        """Return a step as a sentence, or the different sentences of steps that are refined together."""
+        return "; ".join(dict.fromkeys(map(self._of_step, step.together)))
 
     def _of_step(self, step: Step) -> str:
         behavior = self.domain.behaviors[step.behavior]

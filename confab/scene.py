@@ -6,10 +6,11 @@ import logging
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from io import IOBase
 from os import PathLike
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, overload
+from typing import IO, TYPE_CHECKING, overload
 
 from confab import ontology, planning
 from confab.accepting import AnyPlan, Facts, check_seconds, plan_of, several
@@ -301,15 +302,18 @@ class Scene(Known):
 
 
 @right_arguments
-def load(source: str | Path | rdflib.Graph | Scene | Sequence[str | Path], *, scene: str | None = None) -> Scene:
-    """Load a scene from a shipped name, one or several RDF files, an rdflib graph, or the URL of a SPARQL 1.1 endpoint.
+def load(
+    source: str | Path | IO[str] | IO[bytes] | rdflib.Graph | Scene | Sequence[str | Path], *, scene: str | None = None
+) -> Scene:
+    """Load a scene from a shipped name, RDF files or text, an rdflib graph, or the URL of a SPARQL 1.1 endpoint.
 
     Parameters
     ----------
-    source : str, Path, rdflib.Graph, Scene, or sequence of str or Path
-        The source of the scene. If several files are given, the scene is the first file that no other file imports. A graph is
-        copied, and may import shipped ontologies. If the scene has a robot's body, and its reach facts are missing or outdated,
-        the reach facts are computed and written to ``SCENE.reach.ttl`` beside the scene.
+    source : str, Path, file object, rdflib.Graph, Scene, or sequence of str or Path
+        The source of the scene. A text of more than one line is RDF, not a name. If several files are given, the scene is
+        the first file that no other file imports. A graph is copied, and may import shipped ontologies. If the scene has a
+        robot's body, and its reach facts are missing or outdated, the reach facts are computed and written to
+        ``SCENE.reach.ttl`` beside the scene.
     scene : str, optional
         IRI of the scene at an endpoint with several scenes.
 
@@ -330,7 +334,9 @@ def load(source: str | Path | rdflib.Graph | Scene | Sequence[str | Path], *, sc
     return with_current_reach(read(source, scene=scene), logging.getLogger(__name__).info)
 
 
-def read(source: str | Path | rdflib.Graph | Scene | Sequence[str | Path], *, scene: str | None = None) -> Scene:
+def read(
+    source: str | Path | IO[str] | IO[bytes] | rdflib.Graph | Scene | Sequence[str | Path], *, scene: str | None = None
+) -> Scene:
     """Load a scene as `load` does, but without computing its reach facts."""
     begin = perf_counter()
     if isinstance(source, str) and source.startswith(("http://", "https://")):
@@ -339,6 +345,14 @@ def read(source: str | Path | rdflib.Graph | Scene | Sequence[str | Path], *, sc
         return Scene(connect(source, scene), {"load": perf_counter() - begin})
     if isinstance(source, Scene):
         return source
+    if isinstance(source, str) and "\n" in source:
+        return load_text(source.encode())
+    if isinstance(source, IOBase):
+        name = getattr(source, "name", None)  # the file's folder may have the imported files
+        if isinstance(name, str):
+            return read(Path(name))
+        content = source.read()
+        return load_text(content.encode() if isinstance(content, str) else content)
     graph = _read(source)
     try:
         infer(graph)
@@ -385,7 +399,9 @@ def load_text(content: bytes) -> Scene:
 
         def said(fault: object) -> str:
             text = re.sub(
-                r"put its file beside .*", "a scene from stdin can import only shipped ontologies", str(fault)
+                r"put its file beside .*",
+                "a scene that is given as text can import only shipped ontologies",
+                str(fault),
             )
             return text.replace(f"{folder}/", "")
 

@@ -111,9 +111,9 @@ def learn(
                 advance(f"learned {name}", 1)
             if remembered.links is links and not lived:
                 remark(f"{name}: would make more than {MOST_LINKS:,} of the paper's links; only rules were learned")
+            if remembered.experience.episodes:
+                remembered.save(memory)  # a later scene may exceed the time limit
         assert remembered is not None
-        if remembered.experience.episodes:
-            remembered.save(memory)
     if plot is not None:
         curve.save(plot)
     data = {"memory": str(memory), "links": len(remembered.links), "behaviors": len(remembered.links.tables)}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import io
 import json
 import pickle
 import subprocess
@@ -306,3 +307,10 @@ def test_a_plan_of_a_scene_with_bodies_needs_no_reach_facts_on_disk(tmp_path: Pa
     assert not list(tmp_path.rglob("*.reach.ttl"))
     assert confab.load(tmp_path / "plants-scene.ttl").plan().outcome.status.value == "solved"
     assert list(tmp_path.rglob("*.reach.ttl"))
+
+
+def test_a_scene_is_loaded_from_an_open_file_and_from_text(scene: confab.Scene) -> None:
+    file = ontology.scenes()[SCENE]
+    with file.open() as opened, file.open("rb") as raw:
+        sources = (opened, raw, io.StringIO(file.read_text()), file.read_text())
+        assert all(confab.load(source).goals == scene.goals for source in sources)

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 import rdflib
@@ -17,6 +18,7 @@ from confab.planner.acting.episode import Failure
 from confab.planner.plan import Plan
 from confab.reasoner.generate import write_scene
 from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.limits import OutOfTimeError
 from confab.reasoner.memory.experience import ITSELF, Experience, GoalKind, LearnedRule, Lesson, Method, Tally
 from confab.reasoner.memory.links import Links
 from confab.reasoner.memory.links_file import memory_lines
@@ -238,3 +240,21 @@ def test_a_memory_learns_from_a_result_that_has_its_scene(scene: confab.Scene) -
         TypeError, match="a result or an execution, which has its scene, or a scene and a plan; got Plan alone"
     ):
         one.learn(result.plan)  # type: ignore[arg-type]
+
+
+def test_learning_keeps_the_finished_scenes_if_a_later_one_exceeds_the_time_limit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taught, teach = list[str](), confab.Memory.teach
+
+    def slow(memory: confab.Memory, *given: Any) -> None:
+        if taught:
+            raise OutOfTimeError("gave up")
+        taught.append("first")
+        teach(memory, *given)
+
+    monkeypatch.setattr(confab.Memory, "teach", slow)
+    memory = tmp_path / "memory.ttl"
+    told = CliRunner().invoke(app, ["learn", "beverage-serving", "--memory", str(memory), "--rounds", "2"])
+    assert isinstance(told.exception, OutOfTimeError)
+    assert confab.Memory.load(memory).experience.episodes
