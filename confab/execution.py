@@ -13,21 +13,22 @@ from typing import TYPE_CHECKING, Any, TypedDict
 from confab.accepting import AnyPlan, Facts, check_goal, check_noise, check_seconds, number, plan_of, possible, several
 from confab.formats import EpisodeJson, SeenJson
 from confab.interchange import step_json
-from confab.planner.acting.episode import End, Episode, Event, Intervention, InterventionKind
+from confab.planner.acting.episode import End, Episode, Event, Intervention, InterventionKind, situation
 from confab.planner.acting.executive import act
 from confab.planner.acting.failure_memory import Caution
 from confab.planner.acting.retries import RetryPolicy
-from confab.planner.acting.symbolic_world import SymbolicWorld, place_symbols
+from confab.planner.acting.symbolic_world import SymbolicWorld, place_symbols, with_individual
 from confab.planner.acting.world import World
 from confab.planner.plan import Plan, Planner, SoftGoal, Step, renumbered
 from confab.planner.solve import DEFAULT_MODE, Mode
 from confab.planner.validation import open_goals
+from confab.reasoner.aggregates.totals import exceptions
 from confab.reasoner.amounts import written
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import within
 from confab.reasoner.memory.links import Links
 from confab.reasoner.names import RightNames, nearest, right_names
-from confab.reasoner.possible import PLACE, refuse_derived, refuse_impossible
+from confab.reasoner.possible import PLACE, refuse_derived, refuse_impossible, violated
 from confab.reasoner.reading.goals import parse_fact, with_goals
 from confab.reasoner.symbols import Fact, Problem, Symbol
 
@@ -216,16 +217,12 @@ def _box(problem: Problem, words: list[str], text: str, when: dict[str, Any]) ->
 
 def _widened(problem: Problem, added: Intervention) -> Problem:
     """Return the problem with the individual that an intervention adds, and with the facts of this individual."""
-    from confab.planner.acting.symbolic_world import with_individual
-
     initial = {**problem.initial, **{fact.symbol: fact.value for fact in added.facts}}
     return replace(with_individual(problem, added.individual, added.kind), initial=initial)
 
 
 def _add(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -> Intervention:
     """Return the intervention that adds an individual with facts, read from words like ``Cup cup9 LOCATION location5``."""
-    from confab.planner.acting.symbolic_world import with_individual
-
     if len(words) < 4 or len(words) % 2:
         raise KnowledgeError(f"'{text}': wanted 'add CLASS NAME SITUATION value …'")
     kind, individual, *pairs = words
@@ -337,6 +334,30 @@ class Execution(metaclass=RightNames):
         return self.episode.status is End.REACHED
 
     @property
+    def violations(self) -> tuple[str, ...]:
+        """The violations of constraints that were observed, each with its time; steps cause none, but interventions may."""
+        problem, episode = self.scene.problem, self.episode
+        for one, _ in episode.interventions:
+            if one.change is InterventionKind.ADD:
+                problem = with_individual(problem, one.individual, one.kind)
+        texts, before = list[str](), set[Symbol]()
+        for seconds in sorted({change.seconds for change in episode.course}) if problem.domain.constraints else ():
+            state = situation(episode.initial, episode.course, seconds)
+            found = exceptions(problem.domain, problem.classes, problem.relations, state)
+            gone = {
+                one.individual
+                for one, at in episode.interventions
+                if one.change is InterventionKind.REMOVE and at <= seconds
+            }
+            now = {symbol for symbol, number in found.items() if number != "0" and gone.isdisjoint(symbol.arguments)}
+            texts += [
+                f"at {seconds:g} s: {violated(problem.domain.constraints[symbol.situation], symbol.arguments)}"
+                for symbol in sorted(now - before)
+            ]
+            before = now
+        return tuple(texts)
+
+    @property
     def soft_goals(self) -> tuple[SoftGoal, ...]:
         """The soft goals of the task, the heaviest first, without goals that an intervention or `goals` dropped or replaced."""
         problem, episode = self.scene.problem, self.episode
@@ -386,6 +407,7 @@ class Execution(metaclass=RightNames):
                 f"; {what}: {one.fact} (weight {written(one.weight)})" for one in self.soft_goals if one.met is met
             )
         text += "".join(f"; seen: {found.text}" for found, _ in episode.discovered if found.text)
+        text += "".join(f"; {violation}" for violation in self.violations)
         text += "".join(f"; {reason.text}" for reason in episode.reasons)
         return text + (
             f"; the step or time of an intervention wasn't reached: {', '.join(i.text for i in episode.missed)}"

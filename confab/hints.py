@@ -406,6 +406,7 @@ EXECUTION = {
     "result.cost": "cost reward total_reward total_cost score return_ returns",
     "plan.length": "length num_steps n_steps size len count",
     "scene.execute(world=WORLD)": "world simulator env environment backend robot simulate step_simulation simulation",
+    "violations": "constraints constraint_violations violated broken_constraints violated_constraints",
     "episode.reasons": "failure_reason why_failed error_message why",
 }
 REPORT = {

@@ -8,12 +8,12 @@ without a value is unknown, which is allowed.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Container, Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
 from confab.reasoner.amounts import DECIMAL, Quantity, written
-from confab.reasoner.symbols import FALSE, TRUE, Domain, Fact, Problem, State, Symbol
+from confab.reasoner.symbols import FALSE, TRUE, Constraint, Domain, Fact, Problem, State, Symbol
 
 PLACE, HELD, POSITION = "perceive_place", "perceive_held", "perceive_hand_position"
 """Perceivers of an object's place, of the object in a hand, and of a hand's position."""
@@ -106,6 +106,12 @@ def refuse_derived(domain: Domain, facts: Iterable[Fact], cause: str = "") -> No
             raise ImpossibleStateError(f"{cause}: {text}" if cause else text)
 
 
+def violated(constraint: Constraint, arguments: Sequence[str]) -> str:
+    """Return as text that a constraint is violated for individuals."""
+    about = f" of {' and '.join(arguments)}" if arguments else ""
+    return f"{constraint}, and it is {'false' if constraint.always else 'true'}{about}"
+
+
 def values_at_fault(state: State, domain: Domain, declared: Container[str]) -> Iterator[Impossible]:
     """Yield undeclared values, invalid amounts, amounts out of bounds, and violated constraints."""
     for symbol, value in state.items():
@@ -114,10 +120,9 @@ def values_at_fault(state: State, domain: Domain, declared: Container[str]) -> I
             name, remedy = symbol.situation, "state such an amount"
             if name in domain.constraints:
                 constraint = domain.constraints[name]
-                about = f" of {' and '.join(symbol.arguments)}" if symbol.arguments else ""
                 yield Impossible(
                     symbol,
-                    f"{constraint}, and it is {'false' if constraint.always else 'true'}{about} here",
+                    f"{violated(constraint, symbol.arguments)} here",
                     "constraints hold in every state, from the first one on",
                     f"change the facts from which {constraint.situation} follows, or its rule",
                 )

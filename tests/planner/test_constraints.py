@@ -117,6 +117,9 @@ def test_a_violation_of_a_constraint_by_an_intervention_is_removed() -> None:
     done = confab.load("drums-small").execute(interventions=["after=2 base IN bay3"])
     assert done.reached
     assert len(done.episode.replans) == 1
+    assert [text.partition(": ")[2] for text in done.violations] == ["CLASH must never be true, and it is true of bay3"]
+    assert done.violations[0] in done.summary()
+    assert confab.load("drums-small").execute().violations == ()
 
 
 def test_always_of_pddl_becomes_a_constraint_and_other_trajectory_constraints_are_refused_by_name(
