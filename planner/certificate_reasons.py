@@ -186,21 +186,29 @@ class _Causes:
         return FactEvaluation(self.lowest, view), view
 
     def chain(self, goal: Claim) -> tuple[list[Claim], Cause]:
-        """Return the shortest chain of claims from the given claim to a claim whose cause depends on no other claim."""
+        """Return the shortest chain of claims from the given claim to a claim whose cause depends on no other claim.
+
+        If each cause depends on a claim, the chain ends at a claim about an amount whose cause depends only on claims of the
+        chain (a drive needs charge, and only a drive leads to the charger), or is the given claim alone.
+        """
         queue: list[tuple[Claim, ...]] = [(goal,)]
         seen = {goal}
-        last: tuple[tuple[Claim, ...], Cause] | None = None
+        first: tuple[tuple[Claim, ...], Cause] | None = None
+        circle: tuple[tuple[Claim, ...], Cause] | None = None
         for chain in queue:  # the loop appends chains to the queue
             for cause in self.causes(chain[-1], first=len(chain) == 1):
                 if not cause.rests_on:
                     return list(chain), cause
-                if last is None:
-                    last = chain, cause
+                first = first or ((goal,), cause)
+                amount = self.lowest.quantity(chain[-1].fact.symbol.situation) is not None
+                if circle is None and amount and {*cause.rests_on} <= {*chain}:
+                    circle = chain, cause
                 for claim in cause.rests_on:
                     if claim not in seen:
                         seen.add(claim)
                         queue.append((*chain, claim))
-        return ([goal], last[1]) if last else ([goal], Cause("no behaviour has this effect"))
+        found, cause = circle or first or ((goal,), Cause("no behaviour has this effect"))
+        return [*found], cause
 
     def causes(self, claim: Claim, first: bool) -> list[Cause]:
         """For each behaviour that could make a claim false, return the cause that prevents it, the simplest cause first.
@@ -379,7 +387,7 @@ class _Causes:
             if word
         )
         claims = [Claim(fact) for fact in view.claimed]
-        if claims == [claim]:
+        if claims == [claim] and self.certificate.always.get(claim.fact.symbol) != claim.fact.value:
             return Cause(f"{behavior.name} requires that {claim} already holds", (behavior.name, *names), (claim,))
         (first, *more) = [substituted(condition, given) for condition in opened]
         if len(claims) > 1 and not more and isinstance(first, ValueCondition) and not first.negated:

@@ -114,6 +114,20 @@ def test_the_reason_for_unsolvable_states_the_missing_amount(
     assert outcome.reason.text == said
 
 
+def test_the_reason_names_the_amount_that_is_lacking_if_only_its_user_reaches_its_source() -> None:
+    domain = """(define (domain d) (:types place) (:predicates (at ?p - place) (dock ?p - place)) (:functions (charge))
+     (:action drive :parameters (?f ?t - place) :precondition (and (at ?f) (>= (charge) 1))
+      :effect (and (not (at ?f)) (at ?t) (decrease (charge) 1)))
+     (:action load :parameters (?p - place) :precondition (and (at ?p) (dock ?p)) :effect (increase (charge) 4)))"""
+    problem = """(define (problem e) (:domain d) (:objects a b c - place) (:init (at a) (dock c) (= (charge) 0)) (:goal (at b)))"""
+    outcome = solve(Request(imported(parse(domain, problem)).problem))
+    assert outcome.status is Status.UNSOLVABLE and outcome.reason is not None
+    assert (
+        "DRIVE requires the_world CHARGE >= 1, which never holds; so the_world CHARGE 0 always holds"
+        in outcome.reason.text
+    )
+
+
 def test_a_behaviour_that_only_returns_a_consumed_amount_provides_no_additional_amount() -> None:
     problem = pouring("2", 3, Fraction(1), refill=None)
 
