@@ -190,8 +190,11 @@ def test_several_saved_episodes_can_be_queried_together(tmp_path: Path) -> None:
     scene.execute(interventions=FIGURE_8).save(tmp_path / "visit.ttl")
     both = confab.load("beverage-serving").with_episodes(tmp_path / "calm.ttl", tmp_path / "visit.ttl")
     rows = both.query(ready("where-was-it").replace("12.0", "12.5"))
-    places = [row[4] for row in rows if row[3] == "LOCATION"]
+    places = [row[4] for row in rows if row[1] == "cup2" and row[3] == "LOCATION"]
     assert places == ["location5", "location8"]
+    assert {"bottle1", "cup1", "left_hand"} <= {str(row[1]) for row in rows}
+    late = both.query(ready("where-was-it").replace("12.0", "999.0"))
+    assert [row[4] for row in late if row[1] == "cup1" and row[3] == "LOCATION"] == ["location7", "location7"]
     course = [row for row in both.query(ready("how-did-it-go-on")) if row[1] == "cup2" and row[2] == "LOCATION"]
     calm, visit = ["location1", "in_hand", "location5"], ["location1", "in_hand", "location5", "location8"]
     assert [row[5] for row in course] == calm + visit
