@@ -45,6 +45,11 @@ class Labels:
         """Return the label of a term; a term without a label keeps its name."""
         return self.words.get(name, name.lstrip("?"))
 
+    def verb(self, situation: str) -> str:
+        """Return the label of a value property, or the label of a situation type that begins with *is*; otherwise an empty text."""
+        label = self.words.get(situation, "")
+        return self.verbs.get(situation, label if label.startswith("is ") else "")
+
     def fact(self, fact: Fact) -> str:
         """Return a fact as a sentence."""
         situation, (about, *rest) = fact.symbol.situation, fact.symbol.arguments or ("",)
@@ -53,12 +58,12 @@ class Labels:
         unit = kind.quantity.unit if kind is not None and kind.quantity is not None else ""
         if unit and fact.value:
             fact = Fact(fact.symbol, f"{fact.value} {unit}")
-        if situation not in self.verbs and situation in self.words and about and not boolean:
+        if not self.verb(situation) and situation in self.words and about and not boolean:
             of = " ".join(map(self.name, (about, *rest)))
             return f"{self.words[situation]} of {of} is {self.name(fact.value)}"
         named = self.words.get(situation, "")
         of_itself = f"is {named.removeprefix('being ') or situation}" if boolean and not rest else situation
-        verb = self.verbs.get(situation, of_itself).removesuffix(f" {unit}" if unit else "")
+        verb = (self.verb(situation) or of_itself).removesuffix(f" {unit}" if unit else "")
         value = [] if boolean and fact.value in (TRUE, FALSE) else [fact.value]
         verb = _chosen(verb, self.name(fact.value)) if not rest and value else verb
         if verb.endswith(f" {self.name(fact.value)}"):
@@ -110,8 +115,8 @@ class Labels:
     def about(self, symbol: Symbol) -> str:
         """Return the beginning of a sentence about a symbol, without the symbol's value, such as "cup 1 is at"."""
         names = [self.name(name) for name in symbol.arguments]
-        verb = self.verbs.get(symbol.situation)
-        if verb is None or not names:
+        verb = self.verb(symbol.situation)
+        if not verb or not names:
             return " · ".join([*names, self.name(symbol.situation)])
         return _joined([names[0], verb, *names[1:]])
 

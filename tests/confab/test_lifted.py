@@ -19,6 +19,7 @@ from confab.reasoner.symbols import (
     EqualityCondition,
     Fact,
     RelationCondition,
+    SituationType,
     Symbol,
     ValueCondition,
     Witness,
@@ -82,3 +83,11 @@ def test_a_memory_of_a_shipped_scene_is_shown_in_its_labels_without_naming_the_s
     shown = CliRunner().invoke(app, ["memory", "show", str(tmp_path / "memory.ttl")]).output
     assert "is at place" in " ".join(shown.split())
     assert "B1_MOVE" not in shown
+
+
+def test_a_situation_type_whose_label_begins_with_is_needs_no_label_of_its_property() -> None:
+    kinds = {"WET": SituationType("WET", ("Pot",), "", boolean=True), "ON": SituationType("ON", ("Pot",), "Bench")}
+    labels = Labels({"WET": "is watered", "ON": "is on"}, {}, Domain(kinds, {}))
+    assert labels.fact(Fact(Symbol("WET", ("fern",)), "true")) == "fern is watered"
+    assert labels.fact(Fact(Symbol("ON", ("fern",)), "bench")) == "fern is on bench"
+    assert labels.about(Symbol("ON", ("fern",))) == "fern is on"

@@ -331,3 +331,8 @@ def test_a_value_that_names_no_step_is_refused(serving: confab.Result, asked: st
 
 def test_a_negative_number_counts_steps_from_the_end(serving: confab.Result) -> None:
     assert serving.why(-1) == serving.why(serving.plan[-1])
+
+
+def test_steps_refined_together_with_the_same_label_are_named_once(serving: confab.Result) -> None:
+    step = serving.plan[0]
+    assert serving.labels.step(replace(step, joined=(step,))) == serving.labels.step(step)
