@@ -378,13 +378,17 @@ def chosen(name: str, known: Iterable[str]) -> str:
     return best if worth.get(best, 0.0) >= ENOUGH else ""
 
 
-def needless(name: str) -> str:
+def needless(name: str, known: Iterable[str] = ()) -> str:
     """Return the reason why a function or a command needs no parameter of this name, or an empty text.
+
+    A function with the known parameter `sparql` takes values of variables in the query, not as parameters.
 
     >>> needless("random_state")
     'the same call gives the same result in every process'
     """
-    return whole(NEEDLESS, name.lstrip("-").replace("-", "_").lower())
+    return whole(NEEDLESS, name.lstrip("-").replace("-", "_").lower()) or whole(
+        NEEDLESS, "bindings" if "sparql" in known else ""
+    )
 
 
 def command(name: str, known: Iterable[str]) -> str:

@@ -270,7 +270,7 @@ def right_arguments(function: Callable[P, R], bound: int = 0) -> Callable[P, R]:
         for name in named:
             if name not in takes:
                 meant = next((import_module(each).chosen(name, takes) for each in GUESSING), "")
-                why = next((import_module(each).needless(name) for each in GUESSING), "")
+                why = next((import_module(each).needless(name, takes) for each in GUESSING), "")
                 all_of_them = ", ".join((*several, *takes)) or "no arguments"
                 hint = f"did you mean '{meant}'?" if meant else why or f"it takes {all_of_them}"
                 raise TypeError(f"{function.__name__}() takes no '{name}'; {hint}")

@@ -390,3 +390,10 @@ def test_help_with_a_command_is_the_help_of_the_command(capsys: pytest.CaptureFi
     with pytest.raises(SystemExit, match="0"):
         main(["help", "plan"])
     assert capsys.readouterr().out.startswith("Usage: confab plan")
+
+
+def test_the_error_on_a_variable_of_a_query_as_parameter_tells_how_to_state_its_value(scene: confab.Scene) -> None:
+    with pytest.raises(TypeError, match="takes no 'object'; state the values of a variable in the query: VALUES"):
+        scene.query("SELECT ?place { ?object k:location ?place }", object="cup1")  # type: ignore[call-arg]
+    where = "SELECT ?place { VALUES ?object { :cup1 } ?object k:location ?place }"
+    assert len(scene.query(where)) == 1
