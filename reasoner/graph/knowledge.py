@@ -39,7 +39,8 @@ SCENE = ("asserted", "inferred", "reach")
 TRIPLE_TERMS = (b"<<", b"{|", b"parseType")
 """The three notations of triple terms (triples as subjects or objects) in files."""
 HAS_TRIPLE_TERM = "ASK { ?s ?p ?o FILTER(isTRIPLE(?o)) }"
-ONTOLOGIES = "SELECT ?iri WHERE { ?iri a owl:Ontology } ORDER BY ?iri"
+ONTOLOGIES = """
+SELECT ?iri (EXISTS { ?other owl:imports ?iri FILTER(?other != ?iri) } AS ?imported) WHERE { ?iri a owl:Ontology } ORDER BY ?iri"""
 SPARQL_TEXTS = (CORE + "update", CORE + "construct")
 """Properties whose values are SPARQL texts, which use the prefixes of their file."""
 NO_ROWS = "wanted a SELECT query, whose answer is rows"
@@ -337,9 +338,9 @@ def _load(graph: KnowledgeGraph, path: Path, others: Sequence[Path], tolerant: b
 
     read_into(graph, path, "asserted")
     graph.scene = path.as_uri()
-    inside = {text(iri) for (iri,) in graph.select(ONTOLOGIES)}
+    inside = {iri: text(imported) == "true" for iri, imported in graph.select(ONTOLOGIES)}
     with forgiven():
-        graph.scene = _scene_of(graph, path)
+        graph.scene = _scene_of(path, inside)
     given = {iri: file for file in others for iri in sorted(_said(file, "Ontology") or {file.as_uri()})}
     waiting = [(graph.scene, path), *given.items()]
     places: dict[Path, Mapping[str, Path]] = {}
@@ -355,7 +356,7 @@ def _load(graph: KnowledgeGraph, path: Path, others: Sequence[Path], tolerant: b
         if file != path or iri == graph.scene:
             graph.files[iri] = file
         for imported in _imports(graph, iri):
-            if imported in inside:  # the scene's file contains this ontology
+            if ox.NamedNode(imported) in inside:  # the scene's file contains this ontology
                 waiting.append((imported, path))
             elif imported not in done:
                 with forgiven():
@@ -459,20 +460,17 @@ def read_prefixes(graph: KnowledgeGraph, file: Path) -> None:
             graph.declared.setdefault(prefix, namespace)
 
 
-def _scene_of(graph: KnowledgeGraph, path: Path) -> str:
+def _scene_of(path: Path, inside: Mapping[Term, bool]) -> str:
     """Return the IRI of the scene in a file: the only ontology that no other ontology of the file imports."""
-    found = [iri for (iri,) in graph.select(ONTOLOGIES)]
-    imported = {
-        text(iri) for (iri,) in graph.select("SELECT ?iri WHERE { ?other owl:imports ?iri FILTER(?other != ?iri) }")
-    }
-    roots = [iri for iri in found if text(iri) not in imported]
-    if len(roots) != 1 or not isinstance(roots[0], ox.NamedNode):
-        which = f": {', '.join(map(str, roots))}" if len(roots) > 1 else ""
-        raise KnowledgeError(
-            f"{path}: wanted one 'a owl:Ontology' with an IRI, which no other ontology of the file imports, "
-            f"found {len(roots)}{which}; a scene declares itself with it"
-        )
-    return roots[0].value
+    roots = [iri for iri, imported in inside.items() if not imported]
+    if len(roots) == 1 and isinstance(roots[0], ox.NamedNode):
+        return roots[0].value
+    which = f": {', '.join(map(str, roots or inside))}" if len(inside) > 1 else ""
+    circle = ", all imported by another one" if inside and not roots else ""
+    raise KnowledgeError(
+        f"{path}: wanted one 'a owl:Ontology' with an IRI, which no other ontology of the file imports, "
+        f"found {len(roots or inside)}{circle}{which}; a scene declares itself with it"
+    )
 
 
 def _imports(graph: KnowledgeGraph, iri: str) -> Sequence[str]:

@@ -31,7 +31,7 @@ WITHOUT = {"scenes", "runs", "new", "fetch", "picture", "generate", "convert", "
 @pytest.fixture(scope="module")
 def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
     file = tmp_path_factory.mktemp("scenes") / "large.ttl"
-    write_scene(file, "served", 400, 2, 0, 0)
+    write_scene(file, "served", 1_600, 2, 0, 0)
     return file
 
 
