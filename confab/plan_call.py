@@ -170,8 +170,21 @@ def planned(task: PlanningTask) -> Found:
     if outcome.status is Status.UNSOLVABLE and may_overlap_by_need(problem):
         outcome, timed = concurrent(problem, task.deadline)
     elif asks_for_times(problem, task.options.minimise):
-        outcome, timed = scheduled(problem, outcome, task.deadline, task.options.minimise == "makespan")
+        outcome, timed = in_time(task, problem, outcome)
     return Found(problem, outcome, timed, part, task.options.strategy == "optimal")
+
+
+def in_time(task: PlanningTask, problem: Problem, outcome: Outcome) -> tuple[Outcome, TimedPlan | None]:
+    """Schedule a plan; if a cheapest plan misses deadlines or windows, schedule the plan of the default mode instead."""
+    shorten, left = task.options.minimise == "makespan", task.deadline.left
+    cheapest = task.options.strategy == "optimal" and outcome.plan is not None
+    half = Deadline.after(left / 2) if cheapest and left is not None else task.deadline
+    found, timed = scheduled(problem, outcome, half, shorten)
+    if timed is None and cheapest:
+        other = search(task, problem, Searching(DEFAULT_MODE))
+        dearer, timed = scheduled(problem, other, task.deadline, shorten)
+        found = found if timed is None else replace(dearer, bound=outcome.bound)
+    return found, timed
 
 
 def needs_the_whole_scene(task: PlanningTask, outcome: Outcome) -> bool:

@@ -56,8 +56,9 @@ MOST_COMPILED = 200
 HALF, PREFERRED, EARLY = 0.5, 0.8, 0.25
 """Probabilities of kinds of changes.
 
-`HALF` is the probability that an actor is barred instead of a step. `PREFERRED` is the probability that a change concerns a task on
-the critical path. `EARLY` is the probability that a late step becomes an early task.
+`HALF` is the probability that an actor is barred instead of a step, and that a step is barred instead of its behaviour. `PREFERRED`
+is the probability that a change concerns a task on the critical path. `EARLY` is the probability that a late step becomes an early
+task.
 """
 MOST_FAILED = 2
 """Number of failures after which the planner searches no further steps for a task."""
@@ -76,7 +77,7 @@ SharedTask: TypeAlias = "tuple[Aim, Crew]"
 class Crew:
     """A crew: a chosen individual for each class of actors, the barred actors `without`, and the barred steps.
 
-    A barred step is a behaviour with its arguments.
+    A barred step is a behaviour with its arguments; no arguments bar all steps of the behaviour.
     """
 
     chosen: tuple[tuple[str, str], ...] = ()
@@ -179,7 +180,7 @@ def with_crew(problem: Problem, crew: Crew) -> Problem:
         own = [EqualityCondition(t, chosen[k]) for t in acting if (k := behavior.kinds[t]) in chosen]
         own += [EqualityCondition(t, one, negated=True) for t in acting for one in sorted(crew.without)]
         barred = tuple(
-            tuple(EqualityCondition(p.name, a) for p, a in zip(behavior.parameters, arguments, strict=True))
+            tuple(EqualityCondition(p.name, a) for p, a in zip(behavior.parameters, arguments, strict=bool(arguments)))
             for name, arguments in sorted(crew.barred)
             if name == behavior.name
         )
@@ -309,9 +310,9 @@ class _SharingSearch:
     def changed(self, now: _Sequence, random: Random) -> list[SharedTask]:
         """Return the tasks of a sequence after one random change.
 
-        The change assigns another crew to a task, exchanges the crews of two tasks, bars an actor or a step of a task, or moves a
-        task to another position. If the schedule is late, the change may also add a late step as an early task, or drop an early
-        task.
+        The change assigns another crew to a task, exchanges the crews of two tasks, bars an actor, a step or a behaviour of a task,
+        or moves a task to another position. If the schedule is late, the change may also add a late step as an early task, or drop
+        an early task.
         """
         tasks = list(now.tasks)
         i, step, actors, above = random.choice(now.critical)
@@ -332,7 +333,8 @@ class _SharingSearch:
             if actors and random.random() < HALF:
                 tasks[i] = goal, replace(crew, chosen=(), without=crew.without.union(actors[:1]))
             else:
-                tasks[i] = goal, replace(crew, barred=crew.barred | {(step.behavior, step.arguments)})
+                one = step.behavior, step.arguments if random.random() < HALF else ()
+                tasks[i] = goal, replace(crew, barred=crew.barred | {one})
         else:
             tasks.insert(j, tasks.pop(i))
         return tasks

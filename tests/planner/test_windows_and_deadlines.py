@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import pytest
 from click.testing import CliRunner
 
 import confab
+import confab.timing
 from confab.cli import app
-from confab.planner.plan import Status
+from confab.planner.plan import Outcome, Status
+from confab.planner.timed.plan import TimedPlan
 from confab.planning import Result
+from confab.reasoner.symbols import Problem
 from confab.timing import Minimise
 
 ROBOTS = '''
@@ -130,6 +136,43 @@ def test_the_goal_with_the_earliest_deadline_is_achieved_first(tmp_path: Path) -
     result = planned(tmp_path, {"r1": "hall"}, {"a": None, "b": 25, "c": 13})
     assert result.timed is not None
     assert [slot.step.arguments[1] for slot in result.timed.slots if slot.step.behavior == "WASH"] == ["c", "b", "a"]
+
+
+SLOW_DRIVES = (
+    ROBOTS.replace('"PT2S"', '"PT50S"')
+    + """
+:FLY a owl:NamedIndividual, c:Behavior ; c:extends :GO ; c:level 1 ; c:index 4 ; c:cost 5 ; c:actor :FLY.robot ;
+  c:duration "PT2S"^^xsd:dayTimeDuration .
+:FLY.robot a owl:NamedIndividual .
+"""
+)
+
+
+@pytest.mark.parametrize("minimise", [None, "cost"])
+def test_quick_steps_are_chosen_for_deadlines_that_cheap_steps_miss(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, minimise: Minimise | None
+) -> None:
+    monkeypatch.setattr(f"{__name__}.ROBOTS", SLOW_DRIVES)
+    result = planned(tmp_path, {"r1": "hall"}, {"a": 15, "b": 30, "c": 90}, minimise=minimise)
+    assert result.timed is not None
+    assert {"GO", "FLY"} >= {step.behavior for step in result.plan.primitives} - {"WASH"} >= {"FLY"}
+
+
+def test_the_default_plan_is_kept_if_a_cheapest_plan_misses_its_deadlines(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    late = [True]
+
+    def scheduled(problem: Problem, outcome: Outcome, *rest: Any) -> tuple[Outcome, TimedPlan | None]:
+        if late:
+            late.clear()
+            return replace(outcome, status=Status.GAVE_UP, plan=None), None
+        return confab.timing.scheduled(problem, outcome, *rest)
+
+    monkeypatch.setattr("confab.plan_call.scheduled", scheduled)
+    result = planned(tmp_path, {"r1": "hall"}, {"a": 15}, minimise="cost")
+    assert result.solved
+    assert result.outcome.bound == 2
 
 
 def test_a_charger_with_a_window_that_is_too_short_is_avoided(tmp_path: Path) -> None:
