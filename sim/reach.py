@@ -148,13 +148,17 @@ def hindrance(embodiment: Embodiment, place: str) -> tuple[str, ...]:
 
 
 def _why(reacher: Reacher, loaded: Reacher, place: Place, height: float, numbers: Numbers) -> str:
-    """Return why no posture passes all stages of a grasp at a height above a place."""
+    """Return why no posture passes all stages of a grasp at a height above a place.
+
+    The text names the obstacle of the posture with the most room, and by how many millimetres the room is too small.
+    """
     grip = np.array(place.position) + np.array([0.0, 0.0, height])
-    left = np.ones(1, dtype=bool)
     stages = grip_stages(grip, _lowest(numbers))
-    for name, stage, mover in zip(STAGES, stages, (reacher, reacher, loaded), strict=True):
-        q, valid = reacher.solve(stage.poses)
-        valid = valid & left
+    postures, valid = [], np.ones(1, dtype=bool)
+    for name, stage in zip(STAGES, stages, strict=True):
+        q, possible = reacher.solve(stage.poses)
+        postures.append(q)
+        valid = valid & possible
         if not valid.any():
             missing = beyond(reacher.arm, stage.poses)
             return (
@@ -162,14 +166,24 @@ def _why(reacher: Reacher, loaded: Reacher, place: Place, height: float, numbers
                 if missing > 0
                 else f"no posture is within all joints' limits {name}"
             )
-        free = mover.free(q)
-        if not (valid & free).any():
-            gaps = mover.mover.clearances(q[valid], mover.around)
-            blocked = {one: int(np.sum(gap <= mover.margin)) for one, gap in gaps.items()}
-            worst = max(blocked, key=lambda one: (blocked[one], -float(gaps[one].max())))
-            return f"{worst} is in the way {name}"
-        left = valid & free
+    around = _by_part(reacher.around)
+    rooms = {
+        (name, body): gap
+        for name, mover, q in zip(STAGES, (reacher, reacher, loaded), postures, strict=True)
+        for body, gap in mover.mover.clearances(q[valid], around).items()
+    }
+    if rooms:
+        best = int(np.min(list(rooms.values()), axis=0).argmax())
+        (name, body), gap = min(((one, float(gap[best])) for one, gap in rooms.items()), key=lambda room: room[1])
+        if gap <= reacher.margin:
+            return f"{body} is in the way by {(reacher.margin - gap) * 1000:.0f} mm {name}"
     return f"out of reach for an object that stands {SPARE * 100:.0f} cm farther away than its place"
+
+
+def _by_part(around: Obstacles) -> Obstacles:
+    """Return the obstacles with the part and the owner of each solid as its name."""
+    solids = (replace(one, name=f"{one.part} ({one.name})" if one.part else one.name) for one in around.solids)
+    return replace(around, solids=tuple(solids))
 
 
 def _settings(embodiment: Embodiment) -> tuple[Numbers, Sequence[float]]:

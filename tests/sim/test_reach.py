@@ -3,7 +3,7 @@ from dataclasses import replace
 from confab.reasoner.embodiment.values import Embodiment, Fixture, Place
 from confab.sim.reach import fingerprint, hindrance, reach
 
-from .conftest import Case
+from .conftest import Case, case
 
 
 def test_reach_follows_from_the_geometry_of_the_robot(serving: Case) -> None:
@@ -34,10 +34,16 @@ def test_the_hindrance_of_a_place_is_named_with_stage_object_and_height(serving:
     assert hindrance(serving.embodiment, name) == (
         "right_hand: 9.9 cm out of reach when grasping cup1, 50 mm above its base",
     )
-    for height in (0.15, 0.2):
-        assert hindrance(below_a_lamp(serving, height), name)[0].startswith(
-            "left_hand: lamp is in the way when lifting "
+    for height, missing in ((0.19, 26), (0.2, 16)):
+        assert hindrance(below_a_lamp(serving, height), name)[0] == (
+            f"left_hand: lamp is in the way by {missing} mm when lifting bottle1, 75 mm above its base"
         )
+
+
+def test_the_hindrance_of_a_place_in_a_mechanism_is_named_with_the_part() -> None:
+    body = case("kitchen-corner").embodiment
+    low = replace(body, places={**body.places, "shelf": replace(body.places["shelf"], height=0.02)})
+    assert hindrance(low, "shelf")[0] == "left_hand: cupboard.bottom (cupboard) is in the way by 13 mm when grasping"
 
 
 def test_a_hand_reaches_a_place_below_a_solid_if_there_is_room_for_the_lifted_load(serving: Case) -> None:
