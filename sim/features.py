@@ -88,14 +88,15 @@ def ways(frame: FeatureFrame, moving: bool, opening: float = np.inf) -> Ways:
     If the feature's joint is `moving`, the hand may turn during the motion.
     """
     turns = frame.turns()
+    if moving and frame.upright and frame.across is None:
+        turns = np.linspace(frame.low, frame.high, TURNS if frame.high > frame.low else 1)
+        return Ways(*(part.ravel() for part in np.meshgrid(turns, turns, SWIVELS)))
     if frame.across is not None:
         half = frame.across(turns)
         turn, swivel = (part.ravel() for part in np.meshgrid(turns[half < opening], SWIVELS))
         return Ways(turn, turn, swivel, SKEWED * (frame.across(turn) - half.min()))
-    if not moving or not frame.upright or len(turns) == len(YAWS):
-        turn, swivel = (part.ravel() for part in np.meshgrid(turns, SWIVELS))
-        return Ways(turn, turn, swivel)
-    return Ways(*(part.ravel() for part in np.meshgrid(turns, turns, SWIVELS)))
+    turn, swivel = (part.ravel() for part in np.meshgrid(turns, SWIVELS))
+    return Ways(turn, turn, swivel)
 
 
 def locate(engine: Engine, name: str, feature: str, values: Mapping[str, float] | None = None) -> FeatureFrame:

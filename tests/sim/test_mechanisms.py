@@ -224,9 +224,10 @@ def test_a_knob_is_turned_and_a_door_slides_aside_as_an_author_describes_them(tm
             assert (world.links["valve"].values()["valve"] > 1.0) == (behavior == "F3_OPEN")
 
 
-def test_a_crank_is_turned_in_a_scene_without_places(tmp_path: Path) -> None:
+@pytest.mark.parametrize("position", ["e:x 0.55 ; e:y 0.2", "e:x 0.52 ; e:y 0.3"])
+def test_a_hand_turns_about_the_pin_of_a_crank_in_a_scene_without_places(tmp_path: Path, position: str) -> None:
     file = Path(__file__).parents[2] / "docs" / "examples" / "sluice" / "sluice.ttl"
-    (tmp_path / file.name).write_text(file.read_text())
+    (tmp_path / file.name).write_text(file.read_text().replace("e:x 0.55 ; e:y 0.2", position))
     scene = with_reach(confab.load(tmp_path / file.name))
     assert not scene.embodiment.places
     assert str(scene.plan().verify(rollouts=2, perturb=True)).startswith("verified")
