@@ -18,10 +18,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "confab execute beverage-serving -o visit.json",
         "confab report beverage-serving --episode visit.json -o visit.html",
     ),
-    "scenes": (
-        "confab scenes",
-        "confab scenes --json",
-    ),
+    "scenes": ("confab scenes", "confab scenes --json"),
     "runs": (
         "confab run towers-small -o runs --keep",
         "confab run towers-small -o runs --keep",

@@ -9,14 +9,7 @@ from confab.labels import Labels
 from confab.reasoner.amounts import LESS, MORE
 from confab.reasoner.memory.experience import GoalKind, LearnedItem, LearnedOrder, LearnedRule, Method
 from confab.reasoner.sentences import said as plainly
-from confab.reasoner.symbols import (
-    Condition,
-    Domain,
-    Fact,
-    RelationCondition,
-    Symbol,
-    Witness,
-)
+from confab.reasoner.symbols import Condition, Domain, Fact, RelationCondition, Symbol, Witness
 
 MOST_SAID = 6
 """Maximum number of conditions in the sentence about a rule."""

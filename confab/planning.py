@@ -27,12 +27,7 @@ from confab.reasoner.names import RightNames, right_names
 from confab.reasoner.reading.goals import with_goals
 from confab.reasoner.reading.problem import Reading
 from confab.reasoner.symbols import Fact, Problem
-from confab.timing import (
-    Minimise,
-    lanes,
-    needs_others_meanwhile,
-    schedule_json,
-)
+from confab.timing import Minimise, lanes, needs_others_meanwhile, schedule_json
 
 if TYPE_CHECKING:
     from typing import Unpack

@@ -80,12 +80,7 @@ def trajectories(scene: Scene, plan: AnyPlan | None = None, seed: int = 0, both_
     for step, verdict in verdicts:
         if not verdict.ok:
             raise KnowledgeError(f"the plan fails in physics at {step}: {verdict}; nothing is exported")
-    return {
-        "scene": scene.iri,
-        "seed": seed,
-        "rate": RATE,
-        "primitives": list(exported(embodiment, recorder, slots)),
-    }
+    return {"scene": scene.iri, "seed": seed, "rate": RATE, "primitives": list(exported(embodiment, recorder, slots))}
 
 
 def write_trajectories(path: Path, data: Mapping[str, Any]) -> None:

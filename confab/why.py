@@ -177,11 +177,7 @@ class Account:
 
     def json(self) -> AccountJson:
         """Return the explanation as JSON data."""
-        return {
-            "headline": self.headline,
-            "steps": [step.json() for step in self.steps],
-            "proof": list(self.proof),
-        }
+        return {"headline": self.headline, "steps": [step.json() for step in self.steps], "proof": list(self.proof)}
 
     def __str__(self) -> str:
         """Return the explanation as text, with a line for each step and its first reason."""
@@ -440,18 +436,11 @@ def _step_told(asked: str, problem: Problem, plan: Plan, labels: Labels, found: 
     )
     if found.lacks:
         lacks = tuple(labels.condition(condition) for condition in found.lacks)
-        return WhyNot(
-            asked,
-            f"“{what}” isn't applicable. In place of {place}{chosen}, it would require that",
-            lacks,
-        )
+        return WhyNot(asked, f"“{what}” isn't applicable. In place of {place}{chosen}, it would require that", lacks)
     if found.plan is not None:
         return _planned(asked, f"“{what}” in the place of {place}", problem, plan, labels, found)
     if found.reason is not None:
-        return WhyNot(
-            asked,
-            f"“{what}” in the place of {place}: no plan with this step was found: {found.reason.text}",
-        )
+        return WhyNot(asked, f"“{what}” in the place of {place}: no plan with this step was found: {found.reason.text}")
     return WhyNot(asked, f"the plan already has this step: {place}", more=0.0)
 
 

@@ -126,11 +126,7 @@ class Attempt:
         return Reacher(mover, around, margin)
 
     def choose(
-        self,
-        stages: Sequence[Stage],
-        objects: tuple[str, ...],
-        opening: float | None = None,
-        cost: Array | None = None,
+        self, stages: Sequence[Stage], objects: tuple[str, ...], opening: float | None = None, cost: Array | None = None
     ) -> list[int]:
         """Return the indices of the candidate poses that are reachable and collision-free at all stages, the cheapest first.
 

@@ -265,12 +265,7 @@ def _body(client: int, shape: Shape, collision: int, visual: int, position: Arra
 def _with_friction(client: int, shape: Shape, body: int) -> int:
     """Set a body's friction, and return the body."""
     pybullet.changeDynamics(
-        body,
-        -1,
-        lateralFriction=shape.friction,
-        spinningFriction=0.01,
-        rollingFriction=0.001,
-        physicsClientId=client,
+        body, -1, lateralFriction=shape.friction, spinningFriction=0.01, rollingFriction=0.001, physicsClientId=client
     )
     return int(body)
 

@@ -108,12 +108,7 @@ class Camera:
 
 
 def view_of(
-    embodiment: Embodiment,
-    width: int = 960,
-    height: int = 544,
-    below: int = 0,
-    around: float = 0.0,
-    down: float = DOWN,
+    embodiment: Embodiment, width: int = 960, height: int = 544, below: int = 0, around: float = 0.0, down: float = DOWN
 ) -> Camera:
     """Return the nearest camera, on the side opposite the robots, that shows robots and furniture completely.
 

@@ -166,14 +166,7 @@ def _lip(attempt: Attempt, vessel: str, side: Array) -> tuple[float, Array]:
 
 
 def _poses(
-    attempt: Attempt,
-    source: str,
-    target: str,
-    yaw: Array,
-    side: Array,
-    swivel: Array,
-    angle: Array,
-    numbers: Numbers,
+    attempt: Attempt, source: str, target: str, yaw: Array, side: Array, swivel: Array, angle: Array, numbers: Numbers
 ) -> Array:
     """Return hand poses (n, 6) that hold the source tilted by `angle` with its lip over the target.
 

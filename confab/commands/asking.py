@@ -11,17 +11,7 @@ import click
 from click.exceptions import Exit
 
 from confab.commands.given import load_scene
-from confab.commands.options import (
-    AS_JSON,
-    PATH,
-    QUERY_ROWS,
-    QUERY_SECONDS,
-    QUIET,
-    SCENE,
-    SCENE_IRI,
-    Output,
-    command,
-)
+from confab.commands.options import AS_JSON, PATH, QUERY_ROWS, QUERY_SECONDS, QUIET, SCENE, SCENE_IRI, Output, command
 from confab.examples import examples
 from confab.progress import progress
 from confab.reasoner.files import STDOUT

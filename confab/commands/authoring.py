@@ -10,18 +10,7 @@ from typing import TYPE_CHECKING
 import click
 from click.exceptions import Exit
 
-from confab.commands.options import (
-    AS_JSON,
-    GOALS,
-    PATH,
-    QUIET,
-    SCENE,
-    SEED,
-    TIME_LIMIT,
-    Output,
-    command,
-    scene_names,
-)
+from confab.commands.options import AS_JSON, GOALS, PATH, QUIET, SCENE, SEED, TIME_LIMIT, Output, command, scene_names
 from confab.examples import examples
 from confab.progress import progress
 from confab.reasoner.kinds import CONVERTED, GENERATED, IMPORTED, PICTURE, TRAJECTORIES
@@ -34,13 +23,7 @@ if TYPE_CHECKING:
 @command(epilog=examples("new"))
 @click.argument("domain", metavar="DOMAIN", help="Name of the domain: letters, digits, _ or -.")
 @click.option(
-    "-o",
-    "--output",
-    "--folder",
-    "folder",
-    type=PATH,
-    metavar="DIR",
-    help="Folder to write into; default: DOMAIN.",
+    "-o", "--output", "--folder", "folder", type=PATH, metavar="DIR", help="Folder to write into; default: DOMAIN."
 )
 @click.option(
     "--bodies", is_flag=True, help="Add shapes, a table and skills, so that 'confab run' executes plans in physics."
@@ -53,12 +36,7 @@ def new(domain: str, folder: Path | None, bodies: bool) -> None:
     scene = quote(str(next(file for file in files if file.stem.endswith("-scene"))))
     then = "run" if bodies else "plan"
     show_result(
-        "\n".join(
-            [
-                *map(str, files),
-                f"next: confab validate {scene}; confab {then} {scene}; docs/authoring.md",
-            ]
-        )
+        "\n".join([*map(str, files), f"next: confab validate {scene}; confab {then} {scene}; docs/authoring.md"])
     )
 
 
@@ -249,9 +227,7 @@ def import_(
 @click.option("-o", "--output", "out", type=PATH, required=True, metavar="OUT", help="Folder, or file, to write.")
 @click.option("--level", type=int, help="Level to export; by default the lowest.")
 @click.option(
-    "--trajectory",
-    is_flag=True,
-    help="Export the joint trajectories of a verified plan into a .json or .yaml file.",
+    "--trajectory", is_flag=True, help="Export the joint trajectories of a verified plan into a .json or .yaml file."
 )
 @click.option("--bt", "trees", is_flag=True, help="Export a plan as a behaviour tree (BehaviorTree.CPP 4, py_trees).")
 @click.option(

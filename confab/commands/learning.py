@@ -9,16 +9,7 @@ import click
 from click.exceptions import Exit
 
 from confab.commands.given import load_scene
-from confab.commands.options import (
-    AS_JSON,
-    PATH,
-    QUIET,
-    TIME_LIMIT,
-    Command,
-    Output,
-    command,
-    scene_names,
-)
+from confab.commands.options import AS_JSON, PATH, QUIET, TIME_LIMIT, Command, Output, command, scene_names
 from confab.examples import examples
 from confab.progress import progress
 from confab.reasoner.kinds import MEMORY, PICTURE
@@ -52,12 +43,7 @@ if TYPE_CHECKING:
 @click.option(
     "--plot", type=Output(PICTURE), metavar="FILE", help="Draw expansions over the episodes: PNG, SVG or PDF."
 )
-@click.option(
-    "--rounds",
-    type=click.IntRange(1),
-    metavar="N",
-    help="Number of rounds through all scenes.",
-)
+@click.option("--rounds", type=click.IntRange(1), metavar="N", help="Number of rounds through all scenes.")
 @TIME_LIMIT
 @AS_JSON
 @QUIET

@@ -203,10 +203,7 @@ class Seconds(click.FloatRange):
 LONGEST = 1e9
 """Maximum time limit in seconds."""
 TIME_LIMIT = click.option(
-    "--time-limit",
-    type=Seconds(min=0.0, min_open=True),
-    metavar="S",
-    help="Time limit in seconds (exit 3).",
+    "--time-limit", type=Seconds(min=0.0, min_open=True), metavar="S", help="Time limit in seconds (exit 3)."
 )
 SEED = click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of all random numbers.")
 AS_JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of text.")

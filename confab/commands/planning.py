@@ -56,10 +56,7 @@ if TYPE_CHECKING:
     "--optimal", is_flag=True, help="As --mode optimal: improve the plan until it is proved optimal, for up to 10 s."
 )
 @click.option(
-    "--levels",
-    default="free",
-    metavar="free|strict",
-    help="strict: fail if a level has no plan that can be refined.",
+    "--levels", default="free", metavar="free|strict", help="strict: fail if a level has no plan that can be refined."
 )
 @click.option(
     "--from-observed",

@@ -21,12 +21,7 @@ from confab.reasoner.names import local_name
 from confab.reasoner.reading.rows import index_of
 from confab.reasoner.vocabulary import CORE, EMBODIMENT, OWL, RDFS
 
-PREFIXES = {
-    "": EMBODIMENT,
-    "c": CORE,
-    "owl": OWL,
-    "rdfs": RDFS,
-}
+PREFIXES = {"": EMBODIMENT, "c": CORE, "owl": OWL, "rdfs": RDFS}
 ATTRIBUTES = (
     "SELECT DISTINCT ?node ?property ?value WHERE { ?property rdfs:subPropertyOf+ :attribute . ?node ?property ?value }"
 )
@@ -120,8 +115,7 @@ class BodyFacts:
             if (folder / file).is_file():
                 return str(folder / file)
         raise EmbodimentError(
-            f"{node} has e:{camel(name)} '{file}', but this file isn't in {' or '.join(map(str, folders))}",
-            node,
+            f"{node} has e:{camel(name)} '{file}', but this file isn't in {' or '.join(map(str, folders))}", node
         )
 
     def all_numbers(self, node: str) -> dict[str, float]:

@@ -53,7 +53,4 @@ def _width(shape: Shape) -> float:
     return 2 * (radius + (shape.numbers.get("wall", 0.004) if shape.kind == "vessel" else 0.0))
 
 
-RULES: dict[str, Callable[[Embodiment], Iterator[Flaw]]] = {
-    "too-wide": too_wide,
-    "grasped-outside": grasped_outside,
-}
+RULES: dict[str, Callable[[Embodiment], Iterator[Flaw]]] = {"too-wide": too_wide, "grasped-outside": grasped_outside}

@@ -93,10 +93,7 @@ class Frame:
 
 
 def frame(
-    schema: OntologySchema,
-    members: Sequence[Member],
-    namesakes: Collection[str] = (),
-    earlier: Frame | None = None,
+    schema: OntologySchema, members: Sequence[Member], namesakes: Collection[str] = (), earlier: Frame | None = None
 ) -> Frame:
     """Return the domain that a schema describes, together with the classes of some individuals.
 

@@ -9,12 +9,7 @@ from fractions import Fraction
 from itertools import chain
 
 from confab.reasoner.aggregates.extrema import with_extrema
-from confab.reasoner.amounts import (
-    DECIMAL,
-    Amount,
-    bounds_written,
-    written,
-)
+from confab.reasoner.amounts import DECIMAL, Amount, bounds_written, written
 from confab.reasoner.derivation import needed
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.language import is_variable, terms, walk

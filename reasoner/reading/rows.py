@@ -12,10 +12,7 @@ from itertools import chain
 
 import pyoxigraph as ox
 
-from confab.reasoner.amounts import (
-    exact,
-    written,
-)
+from confab.reasoner.amounts import exact, written
 from confab.reasoner.condition_nodes import NodeValues
 from confab.reasoner.graph.knowledge import KnowledgeError, Term, text
 from confab.reasoner.limits import checked

@@ -12,13 +12,7 @@ from confab.reasoner.derivation import needed
 from confab.reasoner.names import local_name
 from confab.reasoner.reading.definitions import Definitions
 from confab.reasoner.reading.rows import OntologySchema
-from confab.reasoner.symbols import (
-    ClassCondition,
-    Domain,
-    Parameter,
-    Rule,
-    ValueCondition,
-)
+from confab.reasoner.symbols import ClassCondition, Domain, Parameter, Rule, ValueCondition
 from confab.reasoner.validation.case import Case, Fault
 from confab.reasoner.vocabulary import CORE, OWL, RDF, RDFS
 
@@ -99,12 +93,7 @@ def _unevaluated(schema: OntologySchema, situation: str, prop: str, changed: Set
     if situation in changed and not into:
         what += f"behaviours change {local_name(situation)}"
         why = "axioms can define static facts only; planning ignores this one"
-        return (
-            situation,
-            what,
-            why,
-            "let behaviours change a subproperty of this one, or drop the axiom",
-        )
+        return (situation, what, why, "let behaviours change a subproperty of this one, or drop the axiom")
     if situation not in schema.pairs:
         what += f"{name} is functional"
         why = "a defined situation is true or false for each pair; a functional value property gives one value"

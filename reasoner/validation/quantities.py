@@ -10,15 +10,7 @@ from math import inf
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, exact, inside, situations_in, written
 from confab.reasoner.language import groups, walk
 from confab.reasoner.sentences import counted, said
-from confab.reasoner.symbols import (
-    AmountEffect,
-    Behavior,
-    ClassCondition,
-    Comparison,
-    Condition,
-    Problem,
-    Witness,
-)
+from confab.reasoner.symbols import AmountEffect, Behavior, ClassCondition, Comparison, Condition, Problem, Witness
 from confab.reasoner.validation.case import Case, Fault
 from confab.reasoner.vocabulary import CORE
 
