@@ -17,38 +17,18 @@ from click.exceptions import Exit
 from confab.commands.options import QUIET
 from confab.terminal import Ending, run_to_end
 
-GROUPS = {  # in the order in which the help lists them
-    "Plan and act": ("plan", "run", "verify", "execute", "explain"),
-    "Learn": ("learn", "memory"),
-    "Look": ("scenes", "report", "runs"),
-    "Ask": ("query", "serve", "mcp", "picture"),
-    "Author": ("validate", "new", "generate", "convert", "fetch"),
-    "Exchange": ("import", "export"),
+GROUPS = {
+    "Plan and act": dict.fromkeys(("plan", "run", "verify", "execute", "explain"), "planning"),
+    "Learn": dict.fromkeys(("learn", "memory"), "learning"),
+    "Look": dict.fromkeys(("scenes", "report", "runs"), "reporting"),
+    "Ask": {"query": "asking", "serve": "asking", "mcp": "asking", "picture": "authoring"},
+    "Author": dict.fromkeys(("validate", "new", "generate", "convert", "fetch"), "authoring"),
+    "Exchange": dict.fromkeys(("import", "export"), "authoring"),
 }
-COMMANDS = {
-    "plan": ("planning", "plan"),
-    "run": ("planning", "run"),
-    "report": ("reporting", "report"),
-    "runs": ("reporting", "runs"),
-    "scenes": ("reporting", "scenes"),
-    "verify": ("planning", "verify"),
-    "execute": ("planning", "execute"),
-    "serve": ("asking", "serve"),
-    "query": ("asking", "query"),
-    "mcp": ("asking", "mcp"),
-    "learn": ("learning", "learn"),
-    "new": ("authoring", "new"),
-    "fetch": ("authoring", "fetch"),
-    "picture": ("authoring", "picture"),
-    "memory": ("learning", "memory_app"),
-    "validate": ("authoring", "validate"),
-    "explain": ("planning", "explain"),
-    "generate": ("authoring", "generate"),
-    "convert": ("authoring", "convert"),
-    "import": ("authoring", "import_"),
-    "export": ("authoring", "export"),
-}
-"""The module in `confab/commands/` and the function of each command."""
+"""The groups of commands in the order of the help; each command has the name of its module in `confab/commands/`."""
+FUNCTIONS = {"import": "import_", "memory": "memory_app"}
+"""The functions that don't have the name of their command."""
+COMMANDS = {name: (module, FUNCTIONS.get(name, name)) for group in GROUPS.values() for name, module in group.items()}
 SETTINGS = {"help_option_names": ["-h", "--help"], "show_default": True}
 
 
@@ -57,7 +37,7 @@ class Commands(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the names of all commands."""
-        return [name for names in GROUPS.values() for name in names]
+        return list(COMMANDS)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the commands, grouped by purpose."""

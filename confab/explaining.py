@@ -61,10 +61,6 @@ class Explanation:
         """Return the explanation as JSON data."""
         return asdict(self)
 
-    def __rich__(self) -> str:
-        """Return the explanation for rich."""
-        return str(self)
-
     def _repr_html_(self) -> str:
         if not self.other:
             return styled(tag("p", str(self)))
@@ -88,6 +84,8 @@ class Explanation:
             there = f"; there: {why.says_other or why.other}" if why.other else ""
             lines.append(f"  {why.weight:+6.2f}  {why.says or f'{why.fact}: {why.chosen}'}{there}")
         return "\n".join([*lines, *([f"  ({self.note})"] if self.note else [])])
+
+    __rich__ = __str__
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Draw the weights as bars, and save the chart if a file is given.

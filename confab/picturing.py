@@ -169,7 +169,7 @@ def class_tree(scene: Known) -> Figure:
         changed, follows = ([one for one in own if (one in defined) is which] for which in (False, True))
         words = "\n".join([local_name(iri), *([", ".join(changed)] * bool(changed))])
         words += f"\nfollows: {', '.join(follows)}" if follows else ""
-        _box(axes, x, y, fill_lines(words), BLUE if own else GREY, 8)
+        _box(axes, x, y, "\n".join(fill(line, 32) for line in words.splitlines()), BLUE if own else GREY, 8)
     axes.set_ylim(rows - 0.5, -0.5)
     return figure
 
@@ -183,11 +183,6 @@ def _reduced(pairs: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
         return list(pairs)
     direct = set(networkx.transitive_reduction(graph).edges)
     return [pair for pair in pairs if pair in direct]
-
-
-def fill_lines(words: str, width: int = 32) -> str:
-    """Wrap each line of a text to a width in characters."""
-    return "\n".join(fill(line, width) for line in words.splitlines())
 
 
 def _parts(scene: Known, iri: str, which: str) -> list[str]:

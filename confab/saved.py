@@ -75,7 +75,10 @@ def read_episode(scene: Known, path: Path) -> Execution:
             events,
             people,
             tuple(_replan(one, path, problem) for one in data["replans"]),
-            tuple(_failure(one, done) for one in data["failures"]),
+            tuple(
+                Failure(done[tuple(one["path"])], str(one["code"]), tuple(one["objects"]), str(one["message"]), {})
+                for one in data["failures"]
+            ),
             {str(name): float(value) for name, value in data["seconds"].items()},
             late,
             course,
@@ -216,7 +219,3 @@ def _replan(one: Data, path: Path, problem: Problem) -> Replan:
         int(one["added"]),
         float(one["seconds"]),
     )
-
-
-def _failure(one: Data, done: Mapping[tuple[int, ...], Step]) -> Failure:
-    return Failure(done[tuple(one["path"])], str(one["code"]), tuple(one["objects"]), str(one["message"]), {})

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from confab.formats import AccountJson, BecauseJson, WhyNotJson
 from confab.labels import Labels
 from confab.page.markup import Markup, styled, tag
-from confab.planner.causal_links import FactChange, Need, NeedKind, Purpose
+from confab.planner.causal_links import Need, NeedKind, Purpose
 from confab.planner.contrast import Ask, Contrast, NoChoiceError, instead_of, with_choice
 from confab.planner.finding import StepPosition, UnknownStepError, find
 from confab.planner.finding import numbers as numbered
@@ -83,13 +83,7 @@ class Because:
             ]
         )
 
-    def __repr__(self) -> str:
-        """Return the reasons in a few lines."""
-        return str(self)
-
-    def __rich__(self) -> str:
-        """Return the reasons for rich."""
-        return str(self)
+    __repr__ = __rich__ = __str__
 
     def reasons(self) -> list[Markup]:
         """Return a short form of the reasons as HTML."""
@@ -144,13 +138,7 @@ class WhyNot:
         """Return the answer in a few lines."""
         return "\n".join([self.answer, *(f"  {line}" for line in (*self.lacks, *self.breaks, *self.steps))])
 
-    def __repr__(self) -> str:
-        """Return the answer in a few lines."""
-        return str(self)
-
-    def __rich__(self) -> str:
-        """Return the answer for rich."""
-        return str(self)
+    __repr__ = __rich__ = __str__
 
     def _repr_html_(self) -> str:
         return styled(
@@ -187,9 +175,7 @@ class Account:
             lines.append(f"{'  ' * len(step.path)}{step.number}  {step.what}{why}")
         return "\n".join(lines)
 
-    def __repr__(self) -> str:
-        """Return the explanation as text."""
-        return str(self)
+    __repr__ = __str__
 
     def __rich__(self) -> Tree:
         """Return the explanation as a tree for rich."""
@@ -335,11 +321,8 @@ def _sentence(need: Need, steps: Steps, number: Mapping[Path, str], labels: Labe
         return f"the effect of {by} depends on it: {facts}"
     if asks == facts:
         return f"{by} requires that {asks}"
-    return f"{by} requires that {asks}; {_instead(need.gives, labels)}"
-
-
-def _instead(changes: Sequence[FactChange], labels: Labels) -> str:
-    return "without this step, " + " and ".join(labels.fact(replace(c.fact, value=c.before)) for c in changes)
+    before = " and ".join(labels.fact(replace(change.fact, value=change.before)) for change in need.gives)
+    return f"{by} requires that {asks}; without this step, {before}"
 
 
 # -------------------------------------------------------------------------------------------------------------- why not

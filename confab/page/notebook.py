@@ -8,7 +8,7 @@ from typing import Any
 
 from confab.page import pieces
 from confab.page.markup import styled, tag
-from confab.planner.plan import Outcome, Plan, Step
+from confab.planner.plan import Outcome, Plan
 from confab.show import summary
 
 
@@ -17,18 +17,10 @@ def _of_outcome(outcome: Outcome) -> str:
     return styled(tag("p", summary(outcome)), plan)
 
 
-def _of_plan(plan: Plan) -> str:
-    return styled(pieces.tree(plan))
-
-
-def _of_step(step: Step) -> str:
-    return styled(pieces.tree(Plan((step,))))
-
-
 SHOWN: dict[tuple[str, str], Callable[[Any], str]] = {
     ("confab.planner.plan", "Outcome"): _of_outcome,
-    ("confab.planner.plan", "Plan"): _of_plan,
-    ("confab.planner.plan", "Step"): _of_step,
+    ("confab.planner.plan", "Plan"): lambda plan: styled(pieces.tree(plan)),
+    ("confab.planner.plan", "Step"): lambda step: styled(pieces.tree(Plan((step,)))),
     ("confab.sim.verdict", "Verdict"): pieces.verdict,
 }
 """The function that returns the HTML of a value, by the module and the name of the value's class."""
