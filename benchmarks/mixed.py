@@ -30,8 +30,9 @@ from worlds.scenes import scene
 from worlds.shrinking import shrunk
 
 FIRST, COUNT, STRETCH = 1_000_000, 1_000, 250
-CONSTRAINED, MUTUAL = 0.3, 0.2
-"""Shares of worlds with a constraint on every state, and with situation types that define each other."""
+CONSTRAINED, MUTUAL, PRICED = 0.3, 0.2, 0.2
+"""Shares of worlds with a constraint on every state, with situation types that define each other, and with costs that depend on
+amounts."""
 SHRUNK = 2
 """Number of worlds that each process shrinks for each kind of fault."""
 SHOWN, MUTANTS = 6, 100
@@ -48,7 +49,7 @@ def signature(one: Complaint) -> str:
 
 def judged(seed: int, folder: Path, every: bool = False) -> Judged:
     """Judge the world of a seed, and return the result."""
-    return Judge(mixed(seed, constrained=CONSTRAINED, mutual=MUTUAL), folder, every).judged()
+    return Judge(mixed(seed, constrained=CONSTRAINED, mutual=MUTUAL, priced=PRICED), folder, every).judged()
 
 
 def stretch(first: int, count: int, into: Path | None, known: dict[str, int]) -> dict[str, Any]:
@@ -60,7 +61,7 @@ def stretch(first: int, count: int, into: Path | None, known: dict[str, int]) ->
     }  # fmt: skip
     with TemporaryDirectory() as folder:
         for seed in range(first, first + count):
-            world, meant = drawn(seed, constrained=CONSTRAINED, mutual=MUTUAL)
+            world, meant = drawn(seed, constrained=CONSTRAINED, mutual=MUTUAL, priced=PRICED)
             its = Judge(world, Path(folder), meant=meant).judged()
             note(found, seed, world, its)
             for one in its.complaints:
@@ -229,7 +230,7 @@ def main(arguments: Sequence[str] = ()) -> int:
     if asked.seed is not None:
         with TemporaryDirectory() as folder:
             its = judged(asked.seed, Path(folder), every=True)
-        print(scene(mixed(asked.seed, constrained=CONSTRAINED, mutual=MUTUAL)))
+        print(scene(mixed(asked.seed, constrained=CONSTRAINED, mutual=MUTUAL, priced=PRICED)))
         print(f"# least {its.least}, states {its.states}, {its.status}")
         for one in (*its.complaints, *its.remarks):
             print(f"# {one.kind} ({one.mode}): {one.text}")

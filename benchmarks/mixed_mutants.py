@@ -60,8 +60,9 @@ BUDGET, PLANS = 4.0, 6
 """CPU seconds of the worlds that are judged with a fault, as measured without the fault; number of changed copies of each plan."""
 SECONDS, WAITING = 60, 600.0
 """CPU seconds for the worlds of a fault, and seconds by the clock for a call on a busy machine."""
-CONSTRAINED, MUTUAL = 0.3, 0.2
-"""Shares of worlds with a constraint on every state, and with situation types that define each other."""
+CONSTRAINED, MUTUAL, PRICED = 0.3, 0.2, 0.2
+"""Shares of worlds with a constraint on every state, with situation types that define each other, and with costs that depend on
+amounts."""
 NOWHERE = "in no world: "
 """Result of a fault in a statement that no world executes."""
 NOTED = "_noted_lines"
@@ -93,7 +94,9 @@ def kills(many: int, into: Path, chosen: Sequence[str] = ()) -> None:
     into.mkdir(parents=True, exist_ok=True)
     record = into / "mixed-mutants.json"
     known: dict[str, Record] = json.loads(record.read_text("utf-8")) if record.is_file() else {}
-    worlds = [drawn(seed, constrained=CONSTRAINED, mutual=MUTUAL) for seed in range(FIRST, FIRST + WORLDS)]
+    worlds = [
+        drawn(seed, constrained=CONSTRAINED, mutual=MUTUAL, priced=PRICED) for seed in range(FIRST, FIRST + WORLDS)
+    ]
     its_judge = [*sorted((ROOT / "worlds").glob("*.py")), Path(__file__)]
     judge = hashed("".join(file.read_text("utf-8") for file in its_judge))
     print("| part | module | faults tried | noticed | in no world | share of the others |\n|---|---|---|---|---|---|")

@@ -19,7 +19,7 @@ from confab.plan_call import planned, read_task
 from confab.plan_options import PlanOptions
 from confab.planner.plan import Outcome, Plan, SoftGoal, Status, Step, paused_collection, renumbered
 from confab.planner.solve import DEFAULT_MODE, Mode, Request, solve
-from confab.planner.validation import Fault, validate
+from confab.planner.validation import Fault, unmet_goals, validate
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import Deadline, within
 from confab.reasoner.memory.links import Links
@@ -158,10 +158,9 @@ def result_of(scene: Known, plan: Plan, goals: Facts = ()) -> Result:
     texts = tuple(several(goals))
     problem = with_goals(scene.problem, texts)
     if not needs_others_meanwhile(problem):
-        if faults := validate(problem.only(problem.weights), plan):
+        problem = problem.only(problem.weights.keys() & unmet_goals(problem, plan))
+        if faults := validate(problem, plan):
             raise KnowledgeError(f"the plan isn't valid in this scene with these goals: {faults[0].text}")
-        soft = problem.weights.keys()
-        problem = problem.only({one for one in soft if validate(problem.only(soft - {one}), plan)})
     return Result(scene, problem, Outcome(Status.SOLVED, plan), dict(scene.seconds), goals=texts)
 
 

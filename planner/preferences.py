@@ -4,11 +4,12 @@ The weight of a soft goal is the cost of leaving the goal unmet. The total cost 
 a plan for the hard goals and the chosen soft goals, and the weights of the other soft goals. `preferred` searches for a choice with
 a small total cost.
 
-First, `preferred` plans for the hard goals alone. If there is no plan for the hard goals, the task has no plan. Second, it plans
-for all soft goals together. The first choice contains all soft goals if there is such a plan, otherwise no soft goal. Third, it
-adds or drops one soft goal at a time, the heaviest first, until no such change makes the choice cheaper. If `finish` is given,
-`preferred` then plans again for the chosen soft goals, with more work. If `prove` is given, it finally computes a lower bound for
-the choice and for all choices that could be cheaper. Choices with a smaller sum of unmet weights come first.
+First, `preferred` plans for the hard goals alone. If there is no plan for the hard goals, the task has no plan, unless a soft goal
+replaces a rest value. Second, it plans for all soft goals together. The first choice contains all soft goals if there is such a
+plan, otherwise no soft goal if there is such a plan. Third, it adds or drops one soft goal at a time, the heaviest first, until no
+such change makes the choice cheaper. If `finish` is given, `preferred` then plans again for the chosen soft goals, with more work.
+If `prove` is given, it finally computes a lower bound for the choice and for all choices that could be cheaper. Choices with a
+smaller sum of unmet weights come first.
 """
 
 from __future__ import annotations
@@ -18,12 +19,13 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
+from itertools import chain, islice
 from math import inf
 from typing import TypeAlias
 
-from confab.planner.plan import Forgone, Outcome, Plan, Status
+from confab.planner.plan import Forgone, Outcome, Status
 from confab.planner.plan_costs import cost_of
-from confab.planner.validation import validate
+from confab.planner.validation import unmet_goals
 from confab.reasoner.limits import LimitError
 from confab.reasoner.symbols import Fact, Problem, Symbol
 
@@ -59,7 +61,8 @@ def preferred(
         The task without the unmet soft goals.
     Outcome
         The result of planning for the returned task; `forgone` contains the unmet soft goals. With `prove`, `bound` is a lower
-        bound on the total cost of any choice, reduced by the weights of the unmet soft goals.
+        bound on the total cost of any choice, reduced by the weights of the unmet soft goals. It is negative if a choice with a
+        smaller total cost than these weights isn't excluded.
     """
     if not problem.weights:
         return problem, (prove or search)(problem)
@@ -67,19 +70,27 @@ def preferred(
     nothing, everything = Goals(), Goals(problem.weights)
     if choices.total(nothing) is None:
         choices.least(nothing)
-        if choices.total(nothing) is None:
-            return choices.task(nothing), choices.outcome(nothing)
-    best = choices.settled(nothing if choices.total(everything) is None else everything)
+    if (first := choices.first()) is None:
+        found = choices.outcome(nothing)
+        certified = not choices.away or choices.excluded()
+        return choices.task(nothing), found if certified else replace(found, status=Status.GAVE_UP, certificate=None)
+    best = choices.settled(first if choices.total(everything) is None else everything)
     if prove is None:
         return choices.result(best, finish=finish)
     return choices.result(*choices.cheapest(best))
 
 
 class _SoftGoalChoices:
-    """The outcomes of planning for choices of soft goals, and lower bounds on the costs of their plans."""
+    """The outcomes of planning for choices of soft goals, and lower bounds on the costs of their plans.
+
+    `away` are the soft goals with another value than the rest value of their symbol. If such a goal isn't chosen, its symbol
+    must be at rest in the end, so that a plan for fewer goals can cost more.
+    """
 
     def __init__(self, problem: Problem, search: PlanSearch, prove: PlanSearch | None) -> None:
         self.problem, self.search, self.prove, self.weights = problem, search, prove, problem.weights
+        rests = {symbol: problem.domain.situations[symbol.situation].rest for symbol in problem.weights}
+        self.away = Goals(symbol for symbol, rest in rests.items() if rest not in (None, problem.goal[symbol]))
         self.outcomes: dict[Goals, Outcome] = {}
         self.conflicts: list[tuple[frozenset[tuple[Symbol, str]], Outcome]] = []
         self.bounds: dict[Goals, Fraction | None] = {}
@@ -100,7 +111,7 @@ class _SoftGoalChoices:
             goals = task.goal_on(task.domain.levels[-1]).items()
             if (known := next((outcome for unmet, outcome in self.conflicts if unmet <= goals), None)) is not None:
                 return self.outcomes.setdefault(kept, known)
-            if any(fewer < kept and outcome.plan is None for fewer, outcome in self.outcomes.items()):
+            if any(self.easier(fewer, kept) and outcome.plan is None for fewer, outcome in self.outcomes.items()):
                 return Outcome(Status.GAVE_UP)
             try:
                 found = self.outcomes[kept] = self.search(task)
@@ -112,6 +123,20 @@ class _SoftGoalChoices:
                 unmet = frozenset((fact.symbol, fact.value) for fact in found.certificate.unmet)
                 self.conflicts.append((unmet, found))
         return self.outcomes[kept]
+
+    def easier(self, fewer: Goals, kept: Goals) -> bool:
+        """Return whether every plan for one choice is also a plan for another choice with fewer goals."""
+        return fewer < kept and self.away.isdisjoint(kept - fewer)
+
+    def excluded(self) -> bool:
+        """Return whether a certificate proves that no choice has a plan; it may not depend on rest values of soft goals."""
+        certificate = self.outcome(Goals()).certificate
+        return certificate is not None and self.away.isdisjoint(fact.symbol for fact in certificate.unmet)
+
+    def first(self) -> Goals | None:
+        """Return the first choice for which a plan is found: without soft goals, or else any choice if a rest value matters."""
+        others = islice(self.ascending(), MOST_CHOICES if self.away and not self.excluded() else 0)
+        return next((kept for kept in chain((Goals(),), others) if self.total(kept) is not None), None)
 
     def least(self, kept: Goals) -> Fraction | None:
         """Return a proved lower bound on the cost of a plan for a choice, or None if there is no plan.
@@ -169,11 +194,11 @@ class _SoftGoalChoices:
     def cheapest(self, best: Goals) -> tuple[Goals, Fraction]:
         """Return the cheapest choice found, at least as cheap as `best`, and a lower bound on the total cost of any choice.
 
-        An additional goal never makes the cheapest plan cheaper. Therefore the bound for the hard goals alone is a lower bound
-        on the cost of a plan for any choice.
+        An additional goal never makes the cheapest plan cheaper, unless the goal replaces a rest value. Therefore the bound for
+        the hard goals alone is otherwise a lower bound on the cost of a plan for any choice.
         """
         self.least(best)
-        cheapest, bounds = self.least(Goals()) or Fraction(0), list[Fraction]()
+        cheapest, bounds = Fraction(0) if self.away else self.least(Goals()) or Fraction(0), list[Fraction]()
         for number, kept in enumerate(self.ascending()):
             bound, total = cheapest + self.unmet(kept), self.total(best)
             assert total is not None
@@ -211,7 +236,7 @@ class _SoftGoalChoices:
             more_work = finish(self.task(kept))
             outcome = min((one for one in (more_work, outcome) if one.plan), key=self.price)
         assert outcome.plan is not None
-        kept |= {symbol for symbol in self.weights if symbol not in kept and self.met(symbol, outcome.plan)}
+        kept = Goals(self.weights.keys() - unmet_goals(self.problem, outcome.plan))
         cost, forgone = self.price(outcome), []
         for symbol in reversed(self.by_weight()):
             if symbol not in kept:
@@ -219,9 +244,5 @@ class _SoftGoalChoices:
                 fact = Fact(symbol, self.problem.goal[symbol])
                 more = None if other is None else (other - compared).limit_denominator(PRECISION)
                 forgone.append(Forgone(fact, self.weights[symbol], more))
-        bound = None if least is None else float(min(max(least - self.unmet(kept), Fraction(0)), cost))
+        bound = None if least is None else float(min(least - self.unmet(kept), cost))
         return self.task(kept), replace(outcome, forgone=tuple(forgone), bound=bound)
-
-    def met(self, symbol: Symbol, plan: Plan) -> bool:
-        """Return whether a soft goal that isn't chosen holds at the end of a plan."""
-        return not validate(self.task(Goals({symbol})), plan)

@@ -107,6 +107,13 @@ def open_goals(problem: Problem) -> list[Fact]:
     return [fact for fact, _ in _unreached(problem, LoggedState(problem, problem.initial))]
 
 
+def unmet_goals(problem: Problem, plan: Plan) -> frozenset[Symbol]:
+    """Return the symbols of the goals that don't hold after the steps of a plan."""
+    check = _PlanExecution(problem, max((step.level for step in plan.walk()), default=0), BehaviorReader(problem))
+    check.carried_out(plan.steps, 0, (), "the plan")
+    return frozenset(fact.symbol for fact, _ in _unreached(problem, check.facts))
+
+
 def _unreached(problem: Problem, facts: LoggedState) -> Iterator[tuple[Fact, str]]:
     """Yield each goal that doesn't hold, with the actual value of its symbol."""
     for symbol, wanted in problem.goal.items():

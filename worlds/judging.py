@@ -14,6 +14,7 @@ import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from functools import partial
 from math import prod
 from pathlib import Path
@@ -51,6 +52,7 @@ SECONDS, CPU = 3.0, 4.0
 MOST = 5_000
 """Maximum number of nodes of the exhaustive search."""
 OPTIMAL, PAPER, STRICT, EXPORTS, EXECUTIONS, LESSONS, READERS, CERTIFICATES, RECOGNITION = 3, 2, 3, 8, 6, 8, 250, 4, 8
+STEPS, SOFT = 12, 8
 """Sampling intervals of expensive checks: with an interval n, one of n worlds is checked."""
 LEFT_OUT, CERTIFYING = 3, 100_000
 """Number of behaviours that are left out in turn for false certificates, and maximum work for each certificate."""
@@ -64,6 +66,10 @@ SLICED = 25
 """Number of reachable states in which behaviours in a part of a world are compared with those in the world."""
 FEW_CASES = 30
 """Maximum number of cases of a certificate that is corrupted, so that its checks take little time."""
+WEIGHTS = "1/2", "1", "2", "3", "5"
+"""Weights of soft goals."""
+EXACT = 1e-9
+"""Largest difference of costs that are equal except for the rounding of floating-point numbers."""
 T = TypeVar("T")
 
 
@@ -256,6 +262,10 @@ class Judge:
             self.call("certificates", lambda: self.false_certificates(read))
         if self.sampled(CERTIFICATES, "proofs", "certificates", "proofs"):
             self.proofs(read)
+        if self.sampled(STEPS, "steps", "steps"):
+            self.fewest_steps(read)
+        if self.sampled(SOFT, "soft", "soft"):
+            self.soft_goals(file)
         if self.sampled(EXPORTS, "export", "export"):
             for level in self.world.problem.domain.levels:
                 self.export(read, level)
@@ -298,13 +308,71 @@ class Judge:
             text = outcome.reason.text if outcome.reason else ""
             self.found.remarks.append(Complaint("gave-up", mode, text))
         if outcome.bound is not None and known and outcome.plan is not None:
-            own = cost(self.meant, outcome.plan)
-            if outcome.bound > (math.inf if least is None else float(least)) + 1e-9:
-                self.complain("wrong bound", mode, f"at least {outcome.bound} is claimed, {least} suffices")
-            elif outcome.bound > own + 1e-9:
-                self.complain("wrong bound", mode, f"at least {outcome.bound} is claimed, its own plan costs {own}")
-            elif mode == "optimal" and outcome.bound < own - 1e-9:
+            own = float(cost(self.meant, outcome.plan))
+            self.bound(mode, outcome.bound, math.inf if least is None else float(least), own)
+            if mode == "optimal" and outcome.bound < own - EXACT:
                 self.found.remarks.append(Complaint("unproved", mode, f"{outcome.bound} … {own}"))
+
+    def fewest_steps(self, read: Scene) -> None:
+        """Compare the plan with the fewest steps, and the bound, with the exhaustive search of the world with unit costs."""
+        problem, own = self.world.problem, self.found.least
+        alike = {name: replace(one, cost=1.0, price=None) for name, one in problem.domain.behaviors.items()}
+        meant = Interpreter(replace(problem, domain=replace(problem.domain, behaviors=alike)))
+        result = self.call("steps", lambda: plan(read, engine=NO_ENGINE, time_limit=SECONDS, minimise="steps"))
+        try:
+            least = meant.explored(problem.domain.levels[-1], MOST).least
+        except TooManyStatesError:
+            return
+        if result is None:
+            return
+        outcome, self.found.status["steps"] = result.outcome, result.outcome.status.value
+        if outcome.status is Status.UNSOLVABLE and own is not None:
+            self.complain("false unsolvable", "steps")
+        if outcome.plan is not None:
+            if wrong := faults(self.meant, outcome.plan):
+                self.complain("invalid plan", "steps", wrong[0])
+            self.bound("steps", outcome.bound, math.inf if least is None else least, len(outcome.plan.primitives))
+
+    def bound(self, mode: str, bound: float | None, least: float, own: float) -> None:
+        """Compare a bound with the least cost, and with the cost of the plan that has been found."""
+        if bound is not None and bound > min(least, own) + EXACT:
+            self.complain(
+                "wrong bound", mode, f"at least {bound} is claimed, {least} suffices; its own plan costs {own}"
+            )
+
+    def soft_goals(self, file: Path) -> None:
+        """Plan with some of the goals as soft goals, and compare the outcomes with the exhaustive search of each choice."""
+        rng, problem = Random(f"soft {self.world.seed}"), self.world.problem
+        weights = {symbol: Fraction(rng.choice(WEIGHTS)) for symbol in problem.goal if rng.random() < 0.7}
+        if not weights:
+            return
+        file.write_text(scene(replace(self.world, problem=replace(problem, weights=weights))), encoding="utf-8")
+        totals = list[float]()
+        for number in range(2 ** len(weights)):
+            unmet = [symbol for at, symbol in enumerate(weights) if number >> at & 1]
+            try:
+                goal = {symbol: value for symbol, value in problem.goal.items() if symbol not in unmet}
+                least = self.meant.wanting(goal).explored(problem.domain.levels[-1], MOST).least
+            except TooManyStatesError:
+                return
+            totals += [] if least is None else [float(least) + float(sum(weights[symbol] for symbol in unmet))]
+        read = load(file)
+        for mode, optimal in (("soft", False), ("soft optimal", True)):
+            call = partial(plan, read, engine=NO_ENGINE, time_limit=SECONDS, optimal=optimal)
+            result = self.call(mode, call)
+            if result is None:
+                continue
+            outcome, self.found.status[mode] = result.outcome, result.outcome.status.value
+            if outcome.status is Status.UNSOLVABLE and totals:
+                self.complain("false unsolvable", mode)
+            if outcome.plan is not None:
+                goal = {symbol: value for symbol, value in problem.goal.items() if symbol not in outcome.unmet}
+                meant = self.meant.wanting(goal)
+                if wrong := faults(meant, outcome.plan):
+                    self.complain("invalid plan", mode, wrong[0])
+                unmet_weights = float(sum(weights[symbol] for symbol in outcome.unmet))
+                least = min(totals, default=math.inf) - unmet_weights
+                self.bound(mode, outcome.bound, least, float(cost(meant, outcome.plan)))
 
     def certificate(self, mode: str, outcome: Outcome) -> None:
         """Compare a certificate of unsolvability with all reachable states."""

@@ -85,28 +85,38 @@ class RandomWorld:
 
 
 def mixed(
-    seed: int, aggregated: float = AGGREGATED, constrained: float = 0.0, remembered: float = 0.0, mutual: float = 0.0
+    seed: int,
+    aggregated: float = AGGREGATED,
+    constrained: float = 0.0,
+    remembered: float = 0.0,
+    mutual: float = 0.0,
+    priced: float = 0.0,
 ) -> RandomWorld:
     """Return the random world of a seed; for the other parameters see `drawn`."""
-    return drawn(seed, aggregated, constrained, remembered, mutual)[0]
+    return drawn(seed, aggregated, constrained, remembered, mutual, priced)[0]
 
 
 def drawn(
-    seed: int, aggregated: float = AGGREGATED, constrained: float = 0.0, remembered: float = 0.0, mutual: float = 0.0
+    seed: int,
+    aggregated: float = AGGREGATED,
+    constrained: float = 0.0,
+    remembered: float = 0.0,
+    mutual: float = 0.0,
+    priced: float = 0.0,
 ) -> tuple[RandomWorld, Interpreter]:
     """Return the random world of a seed, and an interpreter of the world.
 
     Parameters
     ----------
     seed : int
-    aggregated, constrained, remembered, mutual : float
-        The shares of worlds with derived amounts, with constraints on every state, with remembered situation types, and with two
-        situation types that define each other.
+    aggregated, constrained, remembered, mutual, priced : float
+        The shares of worlds with derived amounts, with constraints on every state, with remembered situation types, with two
+        situation types that define each other, and with behaviours whose costs depend on amounts.
     """
     rng = Random(f"mixed {seed}")
     most, least = (MOST, FEW if rng.random() < 0.5 else 2) if rng.random() > UNBOUNDED else (MOST // 10, 0)
     while True:
-        world = _Draft(rng, seed, aggregated, constrained, remembered, mutual).world()
+        world = _Draft(rng, seed, aggregated, constrained, remembered, mutual, priced).world()
         interpreter = Interpreter(world.problem)
         try:
             costs = interpreter.explored(world.problem.domain.levels[-1], most, False).costs
@@ -129,7 +139,7 @@ def crowded(seed: int, constrained: float = 0.0) -> tuple[RandomWorld, Interpret
     """
     rng = Random(f"crowded {seed}")
     while True:
-        world = _Draft(rng, seed, AGGREGATED, constrained, 0.0, 0.0, rng.choice((1, 2, 3))).world()
+        world = _Draft(rng, seed, AGGREGATED, constrained, 0.0, 0.0, 0.0, rng.choice((1, 2, 3))).world()
         domain, classes = world.problem.domain, world.problem.classes
         behaviors = [*domain.behaviors.values(), *(one.behavior for one in domain.aggregates.values())]
         behaviors += [rule.behavior for rules in domain.rules.values() for rule in rules]
@@ -282,10 +292,11 @@ class _Draft(Vocabulary):
         constrained: float,
         remembered: float,
         mutual: float,
+        priced: float,
         crowd: int = 0,
     ) -> None:
         super().__init__(rng)
-        self.crowd = crowd
+        self.crowd, self.valued = crowd, priced
         self.seed, self.share, self.prevented = seed, aggregated, constrained
         self.remembered, self.connected = remembered, mutual
         self.forbidden: list[str] = []  # situation types of which a constraint is drawn
@@ -315,7 +326,7 @@ class _Draft(Vocabulary):
             self.aggregated(number)
         self.mutual()
         self.remembering()
-        behaviors = self.behaviors()
+        behaviors = self.priced(self.behaviors())
         used = {b.level for b in behaviors}
         self.levels = max(used)
         aggregates = self.aggregates
@@ -705,6 +716,23 @@ class _Draft(Vocabulary):
         many = rng.choice((1, 1, 2) if self.crowd else (1, 1, 2, 3))
         found = self.with_effects(name, level, writer, parameters, bound, conditions, many)
         self.made += [effect for effect in found.effects if not effect.value.startswith("?")]
+        return found
+
+    def priced(self, behaviors: list[Behavior]) -> list[Behavior]:
+        """Return the behaviours; in a share of the worlds, some of them have a price in place of a cost."""
+        own, rng = Random(f"prices {self.seed}"), self.rng
+        if own.random() >= self.valued:
+            return behaviors
+        self.rng, found = own, list[Behavior]()  # a separate generator keeps worlds without prices unchanged
+        for one in behaviors:
+            writer = Phrases(self, one.level)
+            writer.kinds = {**one.kinds}
+            price = writer.number(list(writer.kinds), 1, extrema=False) if self.chance(0.6) else None
+            if price is not None:
+                one = replace(one, cost=1.0, price=price)
+                one = replace(one, preconditions=(*one.preconditions, *([one.priced] if one.priced else [])))
+            found.append(one)
+        self.rng = rng
         return found
 
     def with_effects(

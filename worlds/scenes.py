@@ -191,12 +191,13 @@ class _Scene:
     def behavior(self, index: int, one: Behavior) -> Iterator[str]:
         head = [f"c:level {one.level}", f"c:index {index}"]
         head += [f"c:cost {one.cost}"] if one.cost != 1 else []
-        if one.name in self.world.updates and (text := self.as_update(one)) is not None:
+        if one.name in self.world.updates and one.price is None and (text := self.as_update(one)) is not None:
             yield self.node(one.name, "owl:NamedIndividual, c:Behavior", *head, f'c:update """{text}"""')
             return
         self.begin(one.name, [p.name for p in (*one.parameters, *one.variables)])
         head += [f"c:parameter {', '.join(self.terms[p.name] for p in one.parameters)}"] if one.parameters else []
-        asked = [self.condition(condition) for condition in one.preconditions]
+        head += [f"c:price {self.calculation(one.price)}"] if one.price is not None else []
+        asked = [self.condition(condition) for condition in one.asked]
         head += [f"c:precondition {', '.join(asked)}"] if asked else []
         effects = []
         for effect in one.every_effect:
@@ -363,17 +364,22 @@ class _Scene:
         self.begin("task", ())
         goals = []
         for symbol, value in self.problem.goal.items():
+            weight = self.problem.weights.get(symbol)
+            soft = [] if weight is None else [f"c:weight {_decimal(weight)}"]
             if symbol.arguments == ("task",):
                 (rule,) = self.problem.domain.rules[symbol.situation]
                 goals.append(f":{symbol.situation}")
                 node = self.condition(rule.conditions[0])
-                self.nodes[-1] = self.nodes[-1].replace(node, goals[-1], 1)
+                self.nodes[-1] = (
+                    " ; ".join([self.nodes[-1].replace(node, goals[-1], 1).removesuffix(" ."), *soft]) + " ."
+                )
                 continue
             if self.situations[symbol.situation].quantity is None:
-                goals.append(self.part("ValueCondition", *self.said(symbol.situation, symbol.arguments, value)))
+                said = self.said(symbol.situation, symbol.arguments, value)
+                goals.append(self.part("ValueCondition", *said, *soft))
                 continue
             for sign, limit in bounds(value):
-                said = [f"c:situationType :{symbol.situation}", *self.arguments(symbol.arguments)]
+                said = [f"c:situationType :{symbol.situation}", *self.arguments(symbol.arguments), *soft]
                 goals.append(self.part("Comparison", *said, f'c:sign "{sign}"', f"c:amount {_decimal(limit)}"))
         yield self.node("task", "owl:NamedIndividual, c:Task", f"c:goal {', '.join(goals)}")
         yield from self.nodes

@@ -105,6 +105,18 @@ def test_worlds_whose_situation_types_define_each_other_give_no_wrong_answer(tmp
 
 
 @pytest.mark.usefixtures("unlimited_judge")
+@pytest.mark.parametrize("mode", ["optimal", "steps", "soft"])
+def test_costs_that_depend_on_amounts_and_soft_goals_give_no_wrong_bound(mode: str, tmp_path: Path) -> None:
+    solved = 0
+    for seed in (496_300_108, 496_300_117):
+        world, meant = drawn(seed, constrained=0.3, priced=1.0)
+        its = Judge(world, tmp_path, only=mode, meant=meant).judged()
+        assert not its.complaints, (seed, its.complaints)
+        solved += its.status.get(mode) == "solved"
+    assert solved
+
+
+@pytest.mark.usefixtures("unlimited_judge")
 def test_the_part_that_recognition_selects_has_the_same_costs_and_names_as_the_whole_world(tmp_path: Path) -> None:
     for seed in range(8_400_000, 8_400_006):
         world, meant = drawn(seed, constrained=0.3)

@@ -16,10 +16,11 @@ import confab
 import ontology
 from confab.cli import app
 from confab.plan_call import CHOICE_WORK
-from confab.planner.plan import Limits, Outcome, Status
+from confab.planner.plan import Limits, Outcome, Plan, Status
 from confab.planner.plan_costs import cost_of
 from confab.planner.preferences import preferred
 from confab.planner.solve import Request, solve
+from confab.planner.validation import validate
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse
@@ -106,7 +107,30 @@ def test_the_choice_of_soft_goals_is_kept_if_its_proof_gives_up() -> None:
     chosen, outcome = preferred(problem, default)
     same, unproved = preferred(problem, default, lambda task: Outcome(Status.GAVE_UP))
     assert (chosen, outcome.plan, outcome.forgone) == (same, unproved.plan, unproved.forgone)
-    assert unproved.bound == 0.0
+    assert not unproved.proved
+
+
+def test_a_plan_that_leaves_a_goal_unmet_is_not_proved_cheapest_by_searches_that_gave_up() -> None:
+    problem = confab.load("wishes-small").problem
+    soft = replace(problem, weights=dict.fromkeys(problem.goal, Fraction(50)))
+    gave_up = Outcome(Status.GAVE_UP)
+    chosen, outcome = preferred(soft, lambda task: gave_up if task.goal else default(task), lambda task: gave_up)
+    assert (chosen.goal, outcome.plan) == ({}, Plan(()))
+    assert not outcome.proved
+
+
+@pytest.mark.parametrize("seed", [496_400_355, 496_400_429, 496_400_441])
+def test_a_soft_goal_may_be_cheaper_to_meet_than_the_rest_value_of_its_symbol(seed: int, tmp_path: Path) -> None:
+    (tmp_path / "world.ttl").write_text(scene(mixed(seed)), "utf-8")
+    problem = confab.load(tmp_path / "world.ttl").problem
+    rests = {symbol: problem.domain.situations[symbol.situation].rest for symbol in problem.goal}
+    weights = {symbol: Fraction(5) for symbol, rest in rests.items() if rest not in (None, problem.goal[symbol])}
+    assert solve(Request(problem.only(weights))).status is Status.UNSOLVABLE
+    for prove in (None, optimal):
+        task, outcome = preferred(replace(problem, weights=weights), default, prove)
+        assert (outcome.status, outcome.forgone) == (Status.SOLVED, ())
+        assert outcome.plan is not None
+        assert not validate(task, outcome.plan)
 
 
 def test_a_goal_that_a_user_gives_has_to_be_met() -> None:
@@ -186,7 +210,7 @@ def least(problem: Problem, weights: dict[Symbol, Fraction]) -> Fraction | None:
     for many in range(len(weights) + 1):
         for unmet in combinations(weights, many):
             goal = {symbol: value for symbol, value in problem.goal.items() if symbol not in unmet}
-            cost = meant.wanting(goal).explored(problem.domain.levels[-1], 50_000, rests=False).least
+            cost = meant.wanting(goal).explored(problem.domain.levels[-1], 50_000).least
             if cost is not None:
                 found.append(Fraction(cost) + sum((weights[symbol] for symbol in unmet), Fraction(0)))
     return min(found, default=None)
