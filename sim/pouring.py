@@ -53,6 +53,9 @@ If too little was poured, another tilt pours the missing amount. If too much was
 are stuck in a neck leave all at once.
 """
 
+BLEND = 0.1
+"""Cosine of the tilt angles around 90° within which the height of the lip is blended; without it, the hand would jerk at 90°."""
+
 
 def reach_over(attempt: Attempt, target: str, numbers: Numbers) -> dict[str, float]:
     """Carry the held vessel to a pose from which the vessel can be tilted with its lip over the target's opening."""
@@ -132,7 +135,7 @@ def stand_upright(world: Engine, roles: Mapping[str, str], numbers: Numbers) -> 
         height, lip = _lip(attempt, attempt.held, np.array([side]))
         tips = rotations(poses) @ lip[0]
         shifts = tips[-1] - tips
-        shifts[:, 2] += height * (np.maximum(np.cos(angles), 0) - max(np.cos(angle), 0))
+        shifts[:, 2] += height * (_upright(angles) - _upright(np.array(angle)))
     servo = _Servo(world, hand, _way_back(attempt, angles, poses, shifts), angle)
     servo.turn(0.0, numbers["fast"])
     world.run(2 * LAG_CHECK)
@@ -165,6 +168,14 @@ def _lip(attempt: Attempt, vessel: str, side: Array) -> tuple[float, Array]:
     return height, base + rotation[:, 2] * height - side[:, None] * np.array([0.0, radius, 0.0])
 
 
+def _upright(angle: Array) -> Array:
+    """Return the share (n,) of a vessel's height by which its lip is raised at tilt angles (n,): smoothly from 0 to the cosine."""
+    cosine = np.cos(angle)
+    blended = np.maximum(cosine + BLEND, 0.0) ** 2 / (4 * BLEND)
+    share: Array = np.where(cosine > BLEND, cosine, blended)
+    return share
+
+
 def _poses(
     attempt: Attempt, source: str, target: str, yaw: Array, side: Array, swivel: Array, angle: Array, numbers: Numbers
 ) -> Array:
@@ -177,7 +188,7 @@ def _poses(
     height, lip = _lip(attempt, source, side)
     flow = np.stack([np.sin(yaw) * side, -np.cos(yaw) * side, 0 * yaw], -1)
     aim = attempt.world.top(target) - numbers["short"] * flow
-    aim[:, 2] += numbers["clearance"] + height * np.maximum(np.cos(angle), 0.0)
+    aim[:, 2] += numbers["clearance"] + height * _upright(angle)
     poses[:, :3] = aim - np.einsum("nij,nj->ni", rotations(poses), lip)
     return poses
 
