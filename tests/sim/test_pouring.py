@@ -7,7 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from confab.sim.engine import RATE
 from confab.sim.pouring import _Servo, _Way
+from confab.sim.trajectory import Recorder
+from confab.sim.verify import verify
+
+from .conftest import Case
 
 NUMBERS = {"lag": 0.3, "flow": 0.15, "wait": 1.0, "pour_angle": 2.09, "slow": 0.3}
 
@@ -39,3 +44,16 @@ def test_the_hand_rolls_on_when_the_flow_stops_early() -> None:
 
     assert servo.meter(NUMBERS, enough=1.15, nearly=0.9, poured=poured)
     assert poured() == 1.2
+
+
+def test_the_joints_that_shift_a_pouring_hand_never_jerk(moved: Case) -> None:
+    until = next(i for i, step in enumerate(moved.steps) if step.behavior == "B3_TILT") + 1
+    recorder = Recorder()
+    rollout = verify(
+        moved.embodiment, moved.initial, moved.steps[:until], moved.expected[:until], beads=False, watch=recorder
+    )
+    assert rollout.ok
+    hand = moved.steps[until - 1].arguments[0]
+    tilting = np.array(recorder.tapes[hand].postures)[-round(rollout.steps[-1].seconds * RATE) :]
+    acceleration = np.abs(np.diff(tilting, n=2, axis=0)).max(0) * RATE**2
+    assert acceleration[:-1].max() < 60  # radians per second squared; the last joint rolls the hand
