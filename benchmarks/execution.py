@@ -18,8 +18,8 @@ from time import perf_counter, process_time
 from typing import Any
 
 import confab
+from benchmarks._gantt import save_gantt
 from confab.execution import execute
-from confab.gantt import save_gantt
 from confab.labels import labels_of
 from confab.planner.acting.episode import End, Episode, Intervention, InterventionKind
 from confab.planner.acting.executive import act

@@ -64,10 +64,10 @@ def teach(domain: Path, training: list[Path], target: Path) -> str:
     from confab.planner.experience.following import rules_in
     from confab.planner.experience.lessons import teach as learn
     from confab.reasoner.memory.experience import Experience
-    from confab.reasoner.memory.experience_file import save
     from confab.reasoner.names import Names
     from confab.reasoner.pddl.importing import imported
     from confab.reasoner.pddl.syntax import parse_files
+    from worlds.memories import save
 
     experience, begin = Experience("lesson"), process_time()
     for file in training:
@@ -90,10 +90,10 @@ def solve(domain: str, problem: str, target: str, memory: str | None = None) -> 
     from confab.planner.experience.advice import Advisor, plan
     from confab.planner.plan import Limits
     from confab.planner.validation import validate
-    from confab.reasoner.memory.experience_file import load
     from confab.reasoner.names import Names
     from confab.reasoner.pddl.importing import imported
     from confab.reasoner.pddl.syntax import parse_files
+    from worlds.memories import load
 
     scene = imported(parse_files(Path(domain), Path(problem)))
     known = None if memory is None else Advisor(load(Path(memory), Names(())))

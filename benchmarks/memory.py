@@ -31,13 +31,13 @@ from confab.planner.hierarchical import planner as fast
 from confab.planner.plan import Limits, Outcome
 from confab.planner.validation import validate
 from confab.reasoner.memory.experience import ITSELF, Experience, GoalKind, Lesson, Tally
-from confab.reasoner.memory.experience_file import load, save
 from confab.reasoner.names import Names
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse_files
 from confab.reasoner.pddl.words import PddlError
 from confab.reasoner.symbols import Problem
 from worlds.lessons import backwards, problem, taught
+from worlds.memories import load, save
 
 FAMILIES = ("served", "swap", "rotate", "full", "handover", "blocked")
 SHARED = Path(__file__).resolve().parents[2] / "shared"

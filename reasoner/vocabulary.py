@@ -18,7 +18,6 @@ PREFIXES = {"": CORE, "owl": OWL, "rdf": RDF, "rdfs": RDFS, "skos": SKOS, "xsd":
 
 TYPE = RDF + "type"
 INDIVIDUAL = OWL + "NamedIndividual"
-ONTOLOGY = OWL + "Ontology"
 LABEL = RDFS + "label"
 ARGUMENTS = ("about", *(f"argument{place}" for place in range(2, 10)))
 """Properties that state the arguments of conditions, effects and facts, in order."""

@@ -2,40 +2,29 @@
 
 The data have the form of ROS messages. Each primitive and hand has a `control_msgs/FollowJointTrajectory` goal, and
 `control_msgs` gripper commands with times. Grasp frames are a position and a quaternion (x, y, z, w). Units are metres,
-radians, seconds and newtons. `replay` executes the data in a new world by joint servos, without skills, planning or sense of
-touch.
+radians, seconds and newtons.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import pybullet
 
 from confab.reasoner.embodiment.values import Embodiment
-from confab.reasoner.symbols import PrimitiveStep, State
-from confab.sim.arms import hand_frames
+from confab.reasoner.symbols import PrimitiveStep
 from confab.sim.engine import LAG, RATE, Engine
-from confab.sim.robot import CLOSING, Manipulator
-from confab.sim.staging import Perturbation
+from confab.sim.robot import Manipulator
 from confab.sim.urdf import Array
-from confab.sim.world import PhysicsWorld
 
 EXACT = 3e-4
 """Maximum deviation in radians of the exported path from the commanded path; the exported path is linear between its points."""
 
 GOAL_TOLERANCE, TIME_TOLERANCE = 0.01, 0.5
 """Tolerance in radians of each joint at the end of a path, and tolerance in seconds of the path's duration."""
-
-LOOKING = 6
-"""Simulation steps between two measurements of the tracking error in a replay."""
-
-AFTER = 1.0
-"""Seconds that a replay waits after the last primitive."""
 
 
 @dataclass
@@ -193,88 +182,3 @@ def _quaternion(rotation: Array) -> Array:
     vectors: Array = np.linalg.eigh(symmetric)[1]
     found: Array = vectors[:, -1] * (1.0 if vectors[3, -1] >= 0 else -1.0)
     return found
-
-
-# ----------------------------------------------------------------------------------------------------------- replay
-
-
-@dataclass(frozen=True)
-class Replay:
-    """The result of replayed trajectories: perceived facts at the end, and largest error in metres of a hand's position."""
-
-    state: State
-    tracking: float
-
-
-def replay(
-    embodiment: Embodiment,
-    initial: State,
-    primitives: Sequence[Mapping[str, Any]],
-    seed: int = 0,
-    perturb: Perturbation | None = None,
-    beads: bool = True,
-) -> Replay:
-    """Execute exported trajectories in a new world by joint servos; other parameters have the same meaning as in `PhysicsWorld`."""
-    with PhysicsWorld(embodiment, initial, seed, perturb, beads) as world:
-        paths = {name: _path(primitives, name) for name in world.hands}
-        fingers = {name: sorted(_gripper(primitives, name)) for name in world.hands}
-        end = max((float(primitive["end"]) for primitive in primitives), default=0.0) + AFTER
-        tracking = 0.0
-        for number in range(round(end * RATE)):
-            now = number / RATE
-            for name, hand in world.hands.items():
-                times, path = paths[name]
-                if not len(times):
-                    continue
-                goal, velocity = np.array([np.interp(now, times, part) for part in path.T]).reshape(2, -1)
-                hand.command(goal, velocity if now < times[-1] else None)
-                while fingers[name] and fingers[name][0][0] <= now:
-                    _, position, effort = fingers[name].pop(0)
-                    _grip(hand, position, effort)
-                if number % LOOKING == 0:
-                    reached, wanted = hand_frames(hand.arm, np.stack([hand.measured(), goal]))[1]
-                    tracking = max(tracking, float(np.linalg.norm(reached - wanted)))
-            world.run(1)
-        return Replay(world.observe(), tracking)
-
-
-def _path(primitives: Sequence[Mapping[str, Any]], hand: str) -> tuple[Array, Array]:
-    """Return the times (n,) of a hand's samples over all primitives, and its postures with velocities (n, 2 k)."""
-    times, path = [], []
-    for primitive, own in _of_hand(primitives, hand):
-        for point in own["follow_joint_trajectory"]["trajectory"]["points"]:
-            times.append(primitive["begin"] + _seconds(point["time_from_start"]))
-            path.append([*point["positions"], *point["velocities"]])
-    return np.array(times), np.array(path)
-
-
-def _gripper(primitives: Sequence[Mapping[str, Any]], hand: str) -> Iterator[tuple[float, float, float]]:
-    """Yield the time, position and effort of each gripper command of a hand."""
-    for primitive, own in _of_hand(primitives, hand):
-        for one in own["gripper"]:
-            command = one["command"]
-            yield primitive["begin"] + _seconds(one["time_from_start"]), command["position"], command["max_effort"]
-
-
-def _of_hand(
-    primitives: Sequence[Mapping[str, Any]], hand: str
-) -> Iterator[tuple[Mapping[str, Any], Mapping[str, Any]]]:
-    ordered = sorted(primitives, key=lambda primitive: float(primitive["begin"]))
-    return ((primitive, own) for primitive in ordered for own in primitive["hands"] if own["hand"] == hand)
-
-
-def _seconds(duration: Mapping[str, int]) -> float:
-    return duration["sec"] + duration["nanosec"] * 1e-9
-
-
-def _grip(hand: Manipulator, position: float, effort: float) -> None:
-    for joint in hand.fingers:
-        pybullet.setJointMotorControl2(
-            hand.body,
-            joint,
-            pybullet.POSITION_CONTROL,
-            targetPosition=position,
-            force=effort,
-            maxVelocity=CLOSING if position == 0 else 0.3,
-            physicsClientId=hand.client,
-        )

@@ -27,7 +27,6 @@ from urllib.parse import quote
 
 import pyoxigraph as ox
 
-from confab.reasoner.files import write_whole
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.memory.experience import (
     DIGITS,
@@ -139,21 +138,6 @@ def probability(tally: Tally) -> float:
 # ------------------------------------------------------------------------------------------------------------- writing
 
 
-def save(path: Path, experience: Experience, names: Names, domain: str) -> None:
-    """Write a memory file atomically.
-
-    Parameters
-    ----------
-    path : Path
-    experience : Experience
-    names : Names
-        Mapping from the names of behaviours and classes to IRIs.
-    domain : str
-        IRI of the ontology that the file imports.
-    """
-    write_whole(path, turtle(experience, names, domain))
-
-
 def turtle(
     experience: Experience, names: Names, domain: str, only: str | None = None, words: Words = label
 ) -> Iterator[str]:
@@ -223,23 +207,6 @@ def _text(text: str) -> str:
 
 
 # ------------------------------------------------------------------------------------------------------------- reading
-
-
-def load(path: Path, names: Names | None = None) -> Experience:
-    """Read a memory file.
-
-    Raises
-    ------
-    KnowledgeError
-        The file is missing, damaged, has another format version, or isn't a memory of experience.
-    """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise no_such_file(path) from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise KnowledgeError(f"{path}: no memory: it can't be read as text ({error})") from error
-    return parse(lines(text), str(path), names)
 
 
 def parse(found: MemoryLines, source: str, names: Names | None = None) -> Experience:

@@ -14,14 +14,13 @@ from urllib.parse import quote
 
 import pyoxigraph as ox
 
-from confab.reasoner.files import write_whole
 from confab.reasoner.graph.knowledge import BASE, KnowledgeError, KnowledgeGraph, text
 from confab.reasoner.memory.experience_file import MemoryLines, lines, no_such_file
 from confab.reasoner.memory.links import Links
 from confab.reasoner.names import Names
 from confab.reasoner.nesting import MOST_NESTED, nested
 from confab.reasoner.symbols import FALSE, TRUE, Symbol
-from confab.reasoner.vocabulary import ARGUMENTS, CORE, MEMORY, OWL, RDF, RDFS, XSD
+from confab.reasoner.vocabulary import ARGUMENTS, CORE, MEMORY, OWL, RDF, XSD
 
 ASSERTED = """
 SELECT DISTINCT ?node ?property ?value WHERE {
@@ -94,29 +93,10 @@ def memory_names(path: Path, found: MemoryLines | None = None) -> tuple[str, Nam
     )
 
 
-def save_links(path: Path, links: Links, names: Names, scene: str) -> None:
-    """Write knowledge links atomically to a memory file.
-
-    Parameters
-    ----------
-    path : Path
-    links : Links
-    names : Names
-        Mapping from the scene's names to IRIs.
-    scene : str
-        IRI of the scene; the file imports it.
-    """
-    iri = f"{scene.rstrip('#/')}.memory"
-    prefixes = {"owl": OWL, "rdfs": RDFS, "xsd": XSD, "": CORE, "m": iri + "#"}
-    triples = list(_triples(links, names, scene, iri))
-    write_whole(path, ox.serialize(triples, format=ox.RdfFormat.TURTLE, prefixes=prefixes) or b"")
-
-
 def links_text(links: Links, names: Names, scene: str) -> str:
     """Return the triples of knowledge links as N-Triples, without the ontology's declaration."""
     iri = f"{scene.rstrip('#/')}.memory"
-    triples = [t for t in _triples(links, names, scene, iri) if t.subject != ox.NamedNode(iri)]
-    return (ox.serialize(triples, format=ox.RdfFormat.N_TRIPLES) or b"").decode("utf-8")
+    return (ox.serialize(_triples(links, names, iri), format=ox.RdfFormat.N_TRIPLES) or b"").decode("utf-8")
 
 
 def memory_lines(path: Path) -> MemoryLines:
@@ -153,7 +133,7 @@ def _graph(path: Path, found: MemoryLines | None = None) -> KnowledgeGraph:
     return graph
 
 
-def _triples(links: Links, names: Names, scene: str, iri: str) -> Iterator[ox.Triple]:
+def _triples(links: Links, names: Names, iri: str) -> Iterator[ox.Triple]:
     owl, rdf = OWL, RDF
 
     def node(name: str) -> ox.NamedNode:
@@ -168,8 +148,6 @@ def _triples(links: Links, names: Names, scene: str, iri: str) -> Iterator[ox.Tr
         for name, value in parts.items():
             yield ox.Triple(subject, node(CORE + name), value)
 
-    yield ox.Triple(node(iri), node(rdf + "type"), node(owl + "Ontology"))
-    yield ox.Triple(node(iri), node(owl + "imports"), node(scene))
     facts: dict[ox.NamedNode, tuple[Symbol, str]] = {}
     axioms = []
     for conclusion, symbols in sorted(links.tables.items()):

@@ -51,13 +51,12 @@ from confab.reasoner.symbols import (
     Witness,
     allowed,
 )
-from confab.reasoner.vocabulary import ARGUMENTS, RDF
+from confab.reasoner.vocabulary import ARGUMENTS
 
 SITUATION = BASE + "situation"
 RELATION_PROPERTIES = (
     "SELECT DISTINCT ?relation WHERE { ?relation a/rdfs:subClassOf* :Relation ; a owl:ObjectProperty }"
 )
-TYPE = ox.NamedNode(RDF + "type")
 SIGNS = {"increase": "+", "decrease": "-", "scale": "*"}
 MOST_TOGETHER = 3
 """Maximum number of other effects on an amount. If a behaviour has more, the query doesn't test the bounds of the amount."""

@@ -4,8 +4,8 @@ import sys
 from pathlib import Path
 
 from confab.reasoner.memory.experience import Experience, GoalKind, Lesson, Tally
-from confab.reasoner.memory.experience_file import load, save
 from confab.reasoner.names import Names
+from worlds.memories import load, save
 
 
 def main(path: Path) -> None:

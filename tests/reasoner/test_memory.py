@@ -9,9 +9,10 @@ from confab.planner.paper.hierarchy import plan
 from confab.planner.paper.learning import learn
 from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, load, read_into
 from confab.reasoner.memory.links import Links
-from confab.reasoner.memory.links_file import links_text, load_links, memory_names, save_links
+from confab.reasoner.memory.links_file import links_text, load_links, memory_names
 from confab.reasoner.reading.problem import Reading, read
 from confab.reasoner.symbols import Symbol
+from worlds.memories import save_links
 
 
 @pytest.fixture(scope="module")

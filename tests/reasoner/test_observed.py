@@ -7,10 +7,10 @@ import pytest
 
 from confab.reasoner.graph.knowledge import KnowledgeError, load
 from confab.reasoner.memory.links import Links
-from confab.reasoner.memory.links_file import save_links
 from confab.reasoner.reading.observed import assert_observed, load_observed, save_observed
 from confab.reasoner.reading.problem import read
 from confab.reasoner.symbols import Symbol
+from worlds.memories import save_links
 
 CUP2 = Symbol("LOCATION", ("cup2",))
 

@@ -27,9 +27,10 @@ from confab.reasoner.memory.experience import (
     OpenRole,
     Tally,
 )
-from confab.reasoner.memory.experience_file import load, pull, push, save
+from confab.reasoner.memory.experience_file import pull, push
 from confab.reasoner.names import Names
 from confab.reasoner.symbols import AnyOf, ClassCondition, EqualityCondition, RelationCondition, ValueCondition, Witness
+from worlds.memories import load, save
 
 NAMES = Names(f"https://x.org/k#{name}" for name in ("B1_MOVE", "B1_POUR", "Cup", "Bottle"))
 DOMAIN = "https://x.org/k"

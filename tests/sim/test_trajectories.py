@@ -8,9 +8,10 @@ import pytest
 import confab
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.symbols import Symbol
-from confab.sim.trajectory import Recorder, exported, replay
+from confab.sim.trajectory import Recorder, exported
 from confab.sim.verify import expectations, verify
 from confab.trajectories import trajectories, write_trajectories
+from worlds.replaying import replay
 
 yaml = pytest.importorskip("yaml")
 
