@@ -172,10 +172,7 @@ def _placed(problem: Problem, individual: str, text: str, verb: str) -> str:
 
 
 def _push(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -> Intervention:
-    """Return the push of an object, read from ``OBJECT X Y``.
-
-    X is the distance in centimetres away from the robot, and Y the distance to the robot's left.
-    """
+    """Return the push of an object, read from ``OBJECT X Y``: the centimetres away from the robot and to the robot's left."""
     try:
         individual, *by = words
         numbers = tuple(float(number) / 100 for number in by)
@@ -189,10 +186,7 @@ def _push(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -
 
 
 def _box(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -> Intervention:
-    """Return the intervention that puts a box at a place, read from ``PLACE [WIDTHxDEPTHxHEIGHT]`` in centimetres.
-
-    The scene has no facts about the box.
-    """
+    """Return the intervention that puts a box at a place, read from ``PLACE [WIDTHxDEPTHxHEIGHT]`` in centimetres."""
     place, size = (*words, "6x6x12")[:2] if words else ("", "")
     try:
         numbers = tuple(float(number) / 100 for number in size.split("x"))

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TypedDict
+from typing import TYPE_CHECKING, TypedDict
 
 from confab.planner.certificates import CertificateJson
 
+if TYPE_CHECKING:
+    from typing import NotRequired
 
-class _Step(TypedDict):
+
+class StepJson(TypedDict):
+    """A step with its sub-steps; in paper mode, `rank` is the step's rank by cogency (score).
+
+    If the sub-steps also refine other steps of the same level, `joined` has these other steps.
+    """
+
     path: list[int]
     id: int
     level: int
@@ -15,16 +23,8 @@ class _Step(TypedDict):
     arguments: list[str]
     bindings: dict[str, str]
     steps: list[StepJson]
-
-
-class StepJson(_Step, total=False):
-    """A step with its sub-steps; in paper mode, `rank` is the step's rank by cogency (score).
-
-    If the sub-steps also refine other steps of the same level, `joined` has these other steps.
-    """
-
-    rank: float
-    joined: list[StepJson]
+    rank: NotRequired[float]
+    joined: NotRequired[list[StepJson]]
 
 
 class ReasonJson(TypedDict):
@@ -62,17 +62,14 @@ class CacheJson(TypedDict):
     misses: int
 
 
-class _ScheduledStep(TypedDict):
+class ScheduledStepJson(TypedDict):
+    """A scheduled step, with times in seconds. Only primitives have actors and slack."""
+
     path: list[int]
     begin: float
     end: float
-
-
-class ScheduledStepJson(_ScheduledStep, total=False):
-    """A scheduled step, with times in seconds. Only primitives have actors and slack."""
-
-    actors: list[str]
-    slack: float
+    actors: NotRequired[list[str]]
+    slack: NotRequired[float]
 
 
 class ScheduleJson(TypedDict):
@@ -95,7 +92,12 @@ class ForgoneJson(TypedDict):
     price: float | None
 
 
-class _Outcome(TypedDict):
+class OutcomeJson(TypedDict):
+    """The result of planning. For a solved task, the JSON object has the steps and the length of a plan.
+
+    For an unsolved task, the object has the reason, and possibly a certificate that the task is unsolvable.
+    """
+
     scene: str
     status: str
     search: dict[str, CountsJson]
@@ -104,22 +106,14 @@ class _Outcome(TypedDict):
     left: list[LeftJson]
     cache: CacheJson
     seconds: dict[str, float]
-
-
-class OutcomeJson(_Outcome, total=False):
-    """The result of planning. For a solved task, the JSON object has the steps and the length of a plan.
-
-    For an unsolved task, the object has the reason, and possibly a certificate that the task is unsolvable.
-    """
-
-    length: dict[str, int]
-    steps: list[StepJson]
-    cost: float
-    bound: float
-    engine: str
-    reason: ReasonJson
-    certificate: CertificateJson
-    forgone: list[ForgoneJson]
+    length: NotRequired[dict[str, int]]
+    steps: NotRequired[list[StepJson]]
+    cost: NotRequired[float]
+    bound: NotRequired[float]
+    engine: NotRequired[str]
+    reason: NotRequired[ReasonJson]
+    certificate: NotRequired[CertificateJson]
+    forgone: NotRequired[list[ForgoneJson]]
 
 
 class ResultJson(OutcomeJson, total=False):
@@ -207,7 +201,9 @@ class SoftGoalJson(TypedDict):
     met: bool
 
 
-class _Episode(TypedDict):
+class EpisodeJson(TypedDict):
+    """The record of the execution of a task; `soft_goals` is present if the task has soft goals."""
+
     scene: str
     status: str
     reasons: list[ReasonJson]
@@ -225,12 +221,7 @@ class _Episode(TypedDict):
     course: list[SeenJson]
     seconds: dict[str, float]
     measured: bool
-
-
-class EpisodeJson(_Episode, total=False):
-    """The record of the execution of a task; `soft_goals` is present if the task has soft goals."""
-
-    soft_goals: list[SoftGoalJson]
+    soft_goals: NotRequired[list[SoftGoalJson]]
 
 
 class BecauseJson(TypedDict):

@@ -377,10 +377,7 @@ class Known(metaclass=RightNames):
         return self
 
     def _asked(self, sparql: str, limits: QueryLimits | None) -> KnowledgeGraph:
-        """Return the graph for a query, with the derived facts that the query names.
-
-        If imports are missing, a warning is given once.
-        """
+        """Return the graph for a query, with the derived facts that the query names; warn once if imports are missing."""
         from confab.following import write_following
         from confab.reasoner.graph.query_process import QueryLimits
         from confab.reasoner.reading.affordance import SITUATION, write_situation

@@ -226,10 +226,7 @@ def labels_of(knowledge: KnowledgeGraph, names: Names, problem: Problem, others:
 
 
 def _read(knowledge: KnowledgeGraph, iris: Sequence[str]) -> dict[str, str]:
-    """Return the labels of IRIs.
-
-    English labels are preferred to labels without a language; these are preferred to labels in other languages.
-    """
+    """Return the labels of IRIs: in English if possible, otherwise without a language, otherwise in another language."""
     found: dict[str, tuple[int, str]] = {}
     for start in range(0, len(iris), AT_ONCE):
         those = " ".join(f"<{iri}>" for iri in iris[start : start + AT_ONCE])

@@ -530,13 +530,7 @@ __all__ = ["FORMAT", "GoalKind", "LearnedOrder", "Memory", "probability"]
 
 
 def _scene_and_plan(scene: Known | HasSceneAndPlan, plan: AnyPlan | None) -> tuple[Known, AnyPlan]:
-    """Return a scene and a plan that are given as two arguments, or as one: a result or an execution.
-
-    Raises
-    ------
-    TypeError
-        Only a scene, or only a plan without its scene, is given.
-    """
+    """Return a scene and its plan, given as two arguments or as one object, such as a result; else raise `TypeError`."""
     if plan is not None:
         return cast("Known", scene), plan
     made = cast("HasSceneAndPlan", scene)

@@ -149,10 +149,7 @@ def read_report(scene: Known, verdicts: Path, plan: Plan) -> Report:
 
 @contextmanager
 def _read(path: Path, wanted: str) -> Iterator[Data]:
-    """Yield the JSON data in a file.
-
-    If the ``with`` block finds missing or malformed data, its error becomes a `KnowledgeError`.
-    """
+    """Yield the JSON data in a file; an error of the ``with`` block about missing data becomes a `KnowledgeError`."""
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:

@@ -40,9 +40,6 @@ def _leave(code: int) -> NoReturn:
 
 
 def _interrupted(*_: object) -> None:
-    """Print the message about an interrupt, and end the process.
-
-    The function can't use the module `confab.cli`, whose import may not be complete yet.
-    """
+    """Print the message about an interrupt, and end the process, without `confab.cli`, whose import may be incomplete."""
     os.write(2, b"confab: interrupted; every file is unchanged or complete\n")
     os._exit(130)

@@ -56,10 +56,7 @@ def without(problem: Problem, behaviors: Sequence[Behavior]) -> Problem:
 
 
 def _needed(problem: Problem) -> list[Behavior]:
-    """Return the relevant behaviours.
-
-    A behaviour is relevant if it changes a situation type in the goal, or in a condition or effect of a relevant behaviour or rule.
-    """
+    """Return the behaviours that change a situation type in the goal, or in a part of a needed behaviour or rule."""
     behaviors = [*problem.domain.behaviors.values()]
     doing = [*behaviors, *(rule.behavior for rules in problem.domain.rules.values() for rule in rules)]
     counting, before = {symbol.situation for symbol in problem.goal}, -1

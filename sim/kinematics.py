@@ -81,10 +81,7 @@ def _by_elbow(arm: Arm, r: Array, p: Array, swivel: Array, most: float) -> tuple
 
 
 def _angles_far_from_limits(arm: Arm, r: Array, first: int) -> Array:
-    """Return the angles (n, 3) of the spherical joint that begins at joint `first`.
-
-    If the outer axes are parallel, two solutions exist, and the angles farther from the joint limits are returned.
-    """
+    """Return the angles (n, 3) of the spherical joint from joint `first` on, by the solution farther from the limits."""
     axes, part = arm.axes[first : first + 3], slice(first, first + 3)
     three = three_angles(r, axes)
     if abs(axes[0] @ axes[2]) < 0.5:

@@ -118,12 +118,9 @@ def load_mechanism(client: int, mechanism: Mechanism) -> Mechanic:
 
 
 def _let_touch(mechanic: Mechanic) -> None:
-    """Disable collisions between links, or between a link and the base, that are stated to touch or that touch at joint values 0.
+    """Disable collisions of links that are stated to touch, or that touch each other or the base at joint values 0.
 
-    Raises
-    ------
-    ValueError
-        Two links penetrate each other. The message names both links and the overlap in millimetres.
+    Raise `ValueError` with the names and the overlap in millimetres if two links penetrate each other.
     """
     owners: dict[str, tuple[int, Mechanism | Link]] = {mechanic.mechanism.name: (-1, mechanic.mechanism)}
     owners |= {link.name: (mechanic.joints[link.name], link) for link in mechanic.mechanism.links}

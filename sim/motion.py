@@ -273,10 +273,7 @@ def _rrt_connect(
 def _extend(
     reacher: Traveller, nodes: list[Array], back: list[int], target: Array, greedy: bool = False
 ) -> Array | None:
-    """Extend a tree towards `target` as long as the line is free; return the new pose or None.
-
-    Without `greedy`, the extension is short.
-    """
+    """Extend a tree towards `target` while the line is free, only a little without `greedy`; return the new pose or None."""
     nearest = int(np.abs((np.array(nodes) - target) / STEP).max(1).argmin())
     way = line(nodes[nearest], target)[1:]
     if not greedy:

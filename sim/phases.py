@@ -372,10 +372,6 @@ def _home(run: SkillRun, phase: Phase) -> None:
     )
 
 
-def _over(run: SkillRun, phase: Phase) -> None:
-    run.measured |= reach_over(run.attempt, run.feature_of(phase.to)[0], run.numbers)
-
-
 MOTIONS: Mapping[str, Callable[[SkillRun, Phase], None]] = {
     "": lambda run, phase: None,
     "line": _line,
@@ -383,7 +379,7 @@ MOTIONS: Mapping[str, Callable[[SkillRun, Phase], None]] = {
     "joint": _joint,
     "rise": _rise,
     "home": _home,
-    "over": _over,
+    "over": lambda run, phase: run.measured.update(reach_over(run.attempt, run.feature_of(phase.to)[0], run.numbers)),
     "drive": lambda run, phase: drive(run.world, run.roles["robot"], run.roles[phase.to]),
 }
 """The function that executes each kind of motion; the function `_free` executes the motion ``free``."""

@@ -330,10 +330,7 @@ def _draw_sphere(image: Array, depth: Array, camera: Camera, center: Array, radi
 def _look(
     camera: Camera, rotation: Array, base: Array, shape: Shape
 ) -> tuple[tuple[slice, slice], Array, Array, Array, Array] | None:
-    """Return the part of the picture that shows a vessel, rays and eye in the vessel's frame, and the vessel's outer profile.
-
-    Return None if the vessel lies outside the picture.
-    """
+    """Return a vessel's window in the picture (or None), rays and eye in the vessel's frame, and the vessel's outer profile."""
     heights, radii = np.array(shape.profile).T
     radii = radii + wall(shape)
     reach = float(np.hypot(heights[-1] / 2, radii.max()))

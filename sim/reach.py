@@ -12,6 +12,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -99,22 +100,13 @@ def _positions(embodiment: Embodiment) -> tuple[dict[str, tuple[Place, ...]], li
     for _ in range(min(len(carried), LAYERS)):
         below = dict(found)
         for place in carried:
-            spots = [
-                spot for name, spots in below.items() if not _on(embodiment, name, place.carrier) for spot in spots
-            ]
-            raised = (replace(place, position=_sum(spot, place), carrier="", stand=spot.stand) for spot in spots)
+            others = [spots for name, spots in below.items() if embodiment.places[name].carrier != place.carrier]
+            raised = []
+            for spot in chain.from_iterable(others):
+                x, y, z = (round(a + b, 4) for a, b in zip(spot.position, place.position, strict=True))
+                raised.append(replace(place, position=(x, y, z), carrier="", stand=spot.stand))
             found[place.name] = tuple(dict.fromkeys(raised))
     return found, solids
-
-
-def _on(embodiment: Embodiment, place: str, carrier: str) -> bool:
-    """Return whether a place is on the movable body `carrier`."""
-    return embodiment.places[place].carrier == carrier
-
-
-def _sum(spot: Place, place: Place) -> tuple[float, float, float]:
-    x, y, z = (round(a + b, 4) for a, b in zip(spot.position, place.position, strict=True))
-    return x, y, z
 
 
 def hindrance(embodiment: Embodiment, place: str) -> tuple[str, ...]:

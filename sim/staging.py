@@ -114,10 +114,7 @@ def stage(engine: Engine, draft: Draft, perturb: Perturbation | None, beads: boo
 def _put(engine: Engine, name: str, place: str, perturb: Perturbation | None) -> None:
     """Make an object at a place; deviations with which the object overlaps another object are drawn again.
 
-    Raises
-    ------
-    ValueError
-        The object overlaps an existing object. The message names both objects and the overlap in millimetres.
+    Raise `ValueError` with both names and the overlap in millimetres if the object overlaps an existing object.
     """
     for _ in range(DRAWS if perturb is not None else 1):
         shape, position, yaw = _vary(engine, engine.embodiment.bodies[name].shape, place, perturb)

@@ -225,10 +225,7 @@ def _cover(link: ET.Element, turn: Array, origin: Array, folder: Path) -> Sphere
 
 
 def _primitives(link: ET.Element, turn: Array, origin: Array, folder: Path) -> Iterator[LinkShape]:
-    """Yield the collision shapes of a link as boxes and cylinders.
-
-    The cylinder around a sphere replaces the sphere, and the box around a mesh replaces the mesh.
-    """
+    """Yield a link's collision shapes as boxes and cylinders: the cylinder around a sphere, and the box around a mesh."""
     for collision in link.iter("collision"):
         local, shift = _origin(collision)
         geometry = collision.find("geometry")

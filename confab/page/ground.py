@@ -111,10 +111,7 @@ def _furnished(embodiment: Embodiment) -> MapGround:
 
 
 def _drawn(shapes: Iterable[tuple[str, str]]) -> MapGround | None:
-    """Return the polygons and points of shapes, or None.
-
-    An individual without a point is drawn at the mean of its polygon's corners.
-    """
+    """Return the polygons and points of shapes, or None; without a point, the mean of the polygon's corners is the point."""
     spots: dict[str, Point] = {}
     areas: list[Area] = []
     for name, text in shapes:

@@ -142,10 +142,7 @@ class Sheet:
         return turned
 
     def _checked(self, key: str, value: object) -> str:
-        """Return a value of a symbol; raise `KnowledgeError` if the value is invalid.
-
-        For an amount, any text is accepted as the value.
-        """
+        """Return a value of a symbol; raise `KnowledgeError` if the value is invalid. For an amount, any text is a value."""
         symbol = self.symbols[key]
         situation = self.problem.domain.situations[symbol.situation]
         known = self._values(symbol)

@@ -109,10 +109,7 @@ def remembering(behavior: Behavior, count: Aggregate, domain: Domain, classes: M
 
 
 def _alone(effect: AmountEffect, classes: Mapping[str, Sequence[str]]) -> Iterator[AmountEffect]:
-    """Yield an effect.
-
-    An effect on each member of a class is replaced by one effect per member, unless the member is an argument of the symbol.
-    """
+    """Yield an effect; an effect on a class becomes one per member, unless the arguments of its symbol have the member."""
     if effect.each is None or effect.each.name in effect.arguments:
         yield effect
         return

@@ -142,10 +142,7 @@ def _without_flat_top(part: Part) -> bool:
 
 
 def _distance_beside(part: Part, point: tuple[float, float, float]) -> float:
-    """Return the horizontal distance in metres of a point from an upright solid.
-
-    The horizontal distance of a point above, below or inside the solid is at most 0.
-    """
+    """Return the horizontal distance in metres of a point from an upright solid; above, below or inside the solid at most 0."""
     dx, dy = point[0] - part.position[0], point[1] - part.position[1]
     if part.kind == "cylinder":
         return math.hypot(dx, dy) - part.size[0] / 2

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-import pyoxigraph as ox
-
-from confab.reasoner.embodiment.facts import BodyFacts, EmbodimentError, rows
+from confab.reasoner.embodiment.facts import BodyFacts, EmbodimentError
 from confab.reasoner.embodiment.skills import TERM, guards
 from confab.reasoner.embodiment.values import Guard
 
@@ -21,21 +19,6 @@ SINGLE = ("tilt", "joint")
 
 OF_JOINTS = ("opened", "shut", "lower", "upper")
 """Numbers of a link that can be bounds of a measured situation type."""
-
-ONE_VALUED = (
-    "SELECT DISTINCT ?situation WHERE { ?situation c:valueProperty ?property . ?property a owl:FunctionalProperty }"
-)
-VALUED = "SELECT DISTINCT ?situation WHERE { ?situation c:valueProperty ?property }"
-
-
-def one_valued(store: ox.Store) -> frozenset[str]:
-    """Return the situation types whose symbols have exactly one value."""
-    return frozenset(row[0] for row in rows(store, ONE_VALUED))
-
-
-def valued(store: ox.Store) -> frozenset[str]:
-    """Return the situation types that have a value property."""
-    return frozenset(row[0] for row in rows(store, VALUED))
 
 
 def bounds(facts: BodyFacts, situation: str, settings: Mapping[str, float], alone: bool) -> tuple[Guard, ...]:

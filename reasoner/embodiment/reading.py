@@ -8,8 +8,8 @@ from pathlib import Path
 import pyoxigraph as ox
 
 from confab import ontology
-from confab.reasoner.embodiment.facts import BodyFacts, EmbodimentError
-from confab.reasoner.embodiment.measured import MEASURED, asked, bounds, one_valued, valued
+from confab.reasoner.embodiment.facts import BodyFacts, EmbodimentError, rows
+from confab.reasoner.embodiment.measured import MEASURED, asked, bounds
 from confab.reasoner.embodiment.mechanisms import mechanisms
 from confab.reasoner.embodiment.skills import skill_uses
 from confab.reasoner.embodiment.values import (
@@ -36,6 +36,9 @@ PALETTE: tuple[Color, ...] = (
     (0.55, 0.75, 0.20, 1.0),
 )
 """Colours for fillings without a stated colour; the fillings get these colours in declared order."""
+VALUED = "SELECT DISTINCT ?situation WHERE { ?situation c:valueProperty ?property }"
+ONE_VALUED = "SELECT DISTINCT ?situation WHERE { ?situation c:valueProperty/a owl:FunctionalProperty }"
+"""Queries for the situation types with a value property, and for those whose symbols have exactly one value."""
 
 
 def read_embodiment(
@@ -58,16 +61,20 @@ def read_embodiment(
         An attribute is missing or invalid, or a file is missing.
     """
     facts = BodyFacts.read(store)
+    robots = facts.ordered({*facts.having("urdf")} - {*facts.members("Mechanism")})
     return Embodiment(
-        robots=tuple(_robot(facts, node, names, folders) for node in facts.ordered(_robots(facts))),
+        robots=tuple(_robot(facts, node, names, folders) for node in robots),
         fixtures=tuple(_fixture(facts, node, names) for node in facts.members("Fixture")),
         places={names(node): _place(facts, node, names) for node in _places(facts)},
         bodies={names(node): _body(facts, node, shape, names) for node, shape in _shaped(facts)},
         fillings=_fillings(facts, names),
         skills=skill_uses(facts, names, store),
-        perceivers=_perceivers(facts, names, one_valued(store), valued(store)),
+        perceivers=_perceivers(facts, names, store),
         mechanisms=mechanisms(facts, names, folders),
-        stands={names(node): _stand(facts, node, names) for node in facts.members("Stand")},
+        stands={
+            names(node): Stand(names(node), facts.position(node, "0"), facts.number(node, "yaw", 0.0))
+            for node in facts.members("Stand")
+        },
         cameras=tuple(facts.position(node) for node in facts.members("Camera")),
     )
 
@@ -100,10 +107,6 @@ def _place(facts: BodyFacts, node: str, names: Callable[[str], str]) -> Place:
         names(stands[0]) if stands else "",
         facts.number(node, "grasped_at") if "grasped_at" in facts.attributes.get(node, {}) else None,
     )
-
-
-def _stand(facts: BodyFacts, node: str, names: Callable[[str], str]) -> Stand:
-    return Stand(names(node), facts.position(node, "0"), facts.number(node, "yaw", 0.0))
 
 
 def _shaped(facts: BodyFacts) -> list[tuple[str, str]]:
@@ -164,11 +167,6 @@ def _fillings(facts: BodyFacts, names: Callable[[str], str]) -> dict[str, Fillin
 # ----------------------------------------------------------------------------------------------- robots
 
 
-def _robots(facts: BodyFacts) -> list[str]:
-    """Return the nodes that have a URDF file and aren't mechanisms."""
-    return [node for node in facts.having("urdf") if node not in facts.members("Mechanism")]
-
-
 def _robot(facts: BodyFacts, node: str, names: Callable[[str], str], folders: Sequence[Path]) -> Robot:
     hands = facts.ordered(hand for hand, links in facts.links.items() if node in links.get("hand_of", ()))
     return Robot(
@@ -209,9 +207,8 @@ def _hand(facts: BodyFacts, node: str, names: Callable[[str], str], folders: Seq
 # ----------------------------------------------------------------------------------------------- perceivers
 
 
-def _perceivers(
-    facts: BodyFacts, names: Callable[[str], str], with_one_value: frozenset[str], with_values: frozenset[str]
-) -> dict[str, PerceiverUse]:
+def _perceivers(facts: BodyFacts, names: Callable[[str], str], store: ox.Store) -> dict[str, PerceiverUse]:
+    with_one_value, with_values = ({row[0] for row in rows(store, query)} for query in (ONE_VALUED, VALUED))
     found = {}
     for situation in facts.ordered(node for node, links in facts.links.items() if "perceiver" in links):
         perceiver = facts.linked(situation, "perceiver")[0]

@@ -100,15 +100,12 @@ def _static(graph: KnowledgeGraph, changing: set[str]) -> Iterator[ox.Triple]:
             predicate = quad.predicate.value
             if isinstance(quad.object, ox.Literal) or predicate in changing or predicate.startswith(CORE):
                 continue
-            if not (isinstance(quad.object, ox.NamedNode) and _of_behaviors(quad.object.value)):
+            iri = quad.object.value if isinstance(quad.object, ox.NamedNode) else ""
+            if not iri.startswith(CORE) or iri in WORLD:
                 yield quad.triple
     for individual, kind in graph.select(TYPED_BY_FACTS, GIVEN):
         if isinstance(individual, ox.NamedNode) and isinstance(kind, ox.NamedNode):
             yield ox.Triple(individual, TYPE, kind)
-
-
-def _of_behaviors(iri: str) -> bool:
-    return iri.startswith(CORE) and iri not in WORLD
 
 
 def _reason(triples: Iterator[ox.Triple]) -> Iterator[tuple[str, str, str]]:

@@ -114,17 +114,15 @@ def triples_of(episode: Data, names: Names, name: str = "episode") -> Iterator[o
             number, change = changes.pop(0)
             before, planning = planning, describe.node(f"planning{number}")
             yield from describe.planning(planning, whole, number, change)
-            yield describe.link(describe.node(f"plan{number}"), PROV + "wasRevisionOf", _plan_of(before))
+            revised = ox.NamedNode(before.value.replace("#planning", "#plan"))
+            yield describe.link(describe.node(f"plan{number}"), PROV + "wasRevisionOf", revised)
             for other in informed:
                 yield describe.link(planning, PROV + "wasInformedBy", other)
     yield from _phases(describe, whole, episode)
 
 
 def _phases(describe: _Describe, whole: ox.NamedNode, episode: Data) -> Iterator[ox.Triple]:
-    """Yield a phase for each value of each symbol.
-
-    A boolean symbol with several arguments has phases only for the value true.
-    """
+    """Yield a phase for each value of each symbol; of a boolean symbol with several arguments, only for the value true."""
     end = float(episode["seconds"].get("simulated", 0.0))
     values: dict[tuple[str, ...], tuple[str, float]] = {}
     found: list[tuple[tuple[str, ...], str, float, float]] = []
@@ -149,10 +147,6 @@ def _phases(describe: _Describe, whole: ox.NamedNode, episode: Data) -> Iterator
         for property_, argument in zip(ARGUMENTS, arguments, strict=False):
             home = EPISODES if property_ == ARGUMENTS[0] else CORE
             yield describe.link(node, home + property_, describe.of(argument))
-
-
-def _plan_of(planning: ox.NamedNode) -> ox.NamedNode:
-    return ox.NamedNode(planning.value.replace("#planning", "#plan"))
 
 
 class _Describe:

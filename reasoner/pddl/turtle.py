@@ -392,10 +392,7 @@ class _SceneWriter:
 
 
 def _spanned(nodes: NodeWriter, iri: str, span: Span) -> str:
-    """Return the IRI of a condition or effect.
-
-    The time span of the condition or effect is stated, unless it is the whole duration.
-    """
+    """Return the IRI of a condition or effect, whose time span is stated unless it is the whole duration."""
     if span is not Span.THROUGHOUT:
         nodes.nodes.append(f"{iri} c:during c:{span.value}")
     return iri

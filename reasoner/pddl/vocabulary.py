@@ -47,7 +47,8 @@ class PddlNames:
         for symbol in problem.initial:
             self.existing.setdefault(symbol.situation, set()).add(symbol.arguments)
         self.types, self.above = self._types()
-        self.lowest = {member: self.types[kind] for kind in self.above_first() for member in problem.members(kind)}
+        large_first = sorted(self.types, key=lambda kind: -len(problem.members(kind)))
+        self.lowest = {member: self.types[kind] for kind in large_first for member in problem.members(kind)}
 
     def name(self, kind: str, ours: str, wanted: str | None = None) -> str:
         """Return the PDDL name for a name in the scene, given the kind of the name."""
@@ -63,10 +64,7 @@ class PddlNames:
     # --------------------------------------------------------------------------------------------------------- types
 
     def _types(self) -> tuple[dict[str, str], dict[str, str]]:
-        """Return the PDDL types of the classes that become types, and the supertype of each type.
-
-        Of two classes that overlap partially, only the larger class becomes a type.
-        """
+        """Return the PDDL types of classes, and their supertypes; of partially overlapping classes, only the larger has a type."""
         domain = self.problem.domain
         behaviors = [*domain.behaviors.values(), *(rule.behavior for its in domain.rules.values() for rule in its)]
         kinds = [term.kind for one in behaviors for term in (*one.parameters, *one.variables)]
@@ -85,10 +83,6 @@ class PddlNames:
             above[names[members]] = larger[-1] if larger else "object"
         types = {kind: names[its] for kind in self.problem.classes if (its := self.problem.members(kind)) in names}
         return types, above
-
-    def above_first(self) -> list[str]:
-        """Return the classes that become types, sorted from large to small."""
-        return sorted(self.types, key=lambda kind: -len(self.problem.members(kind)))
 
     def variable(self, name: str, kind: str) -> PddlTerm:
         """Return a PDDL variable for the individuals of a class."""

@@ -167,14 +167,9 @@ def names_of(schema: OntologySchema, members: Iterable[Member], namesakes: Itera
 def _rules(
     parts: Parts, schema: OntologySchema, situations: Mapping[str, SituationType]
 ) -> dict[str, tuple[Rule, ...]]:
-    """Return the rules of each derived situation type.
+    """Return the rules of each derived situation type: stated rules, and rules from class definitions and property axioms.
 
-    A rule is stated, or follows from a class definition or from an axiom about the value property.
-
-    Raises
-    ------
-    KnowledgeError
-        A derived situation type is changed by a behaviour, isn't boolean, or depends on its own negation.
+    Raise `KnowledgeError` for a derived type that a behaviour changes, that isn't boolean, or that depends on its own negation.
     """
     changed = {
         parts.one(iri, "situationType") for iri in schema.of_kind("ValueEffect") if parts.values(iri, "situationType")
@@ -245,10 +240,7 @@ def _aggregates(
 ) -> dict[str, Aggregate]:
     """Return the derived amounts, and the counts of the violations of constraints, in order of dependency.
 
-    Raises
-    ------
-    KnowledgeError
-        A derived amount is changed by a behaviour, has two rules, isn't declared as an amount, or depends on itself.
+    Raise `KnowledgeError` for a derived amount that a behaviour changes, with two rules, undeclared, or dependent on itself.
     """
     found: dict[str, Aggregate] = {}
     for iri in schema.of_kind("Rule"):
@@ -292,10 +284,7 @@ def _aggregates(
 def _constraints(parts: Parts, schema: OntologySchema, situations: Iterable[SituationType]) -> dict[str, Constraint]:
     """Return the constraints by the name of the amount that counts their violations.
 
-    Raises
-    ------
-    KnowledgeError
-        A constrained situation type isn't boolean, or is constrained to be both never and always true.
+    Raise `KnowledgeError` for a type that isn't boolean, or that is constrained to be both never and always true.
     """
     found, known = {}, {situation.name: situation for situation in situations}
     for iri in sorted(schema.of_kind("SituationType"), key=parts.names.short):
@@ -319,10 +308,7 @@ def _on_their_levels(
     aggregates: Mapping[str, Aggregate],
     before: Past,
 ) -> Iterator[SituationType]:
-    """Yield the situation types with their levels.
-
-    The level of a derived type is the first level that has all types on which it depends.
-    """
+    """Yield the situation types with their levels; a derived type has the first level with all types on which it depends."""
     known = {s.name: s for s in situations}
     earlier = None
     reads = {name: {s for rule in its for s, _ in needed(rule.conditions)} for name, its in rules.items()}
@@ -370,10 +356,7 @@ def _value_properties(schema: OntologySchema) -> dict[str, tuple[str, bool]]:
 
 
 def _check_behavior(behavior: Behavior, domain: Domain) -> None:
-    """Raise `KnowledgeError` if a behaviour is faulty.
-
-    A fault is a wrong number of arguments, or a situation type that doesn't exist on the behaviour's level.
-    """
+    """Raise `KnowledgeError` for a wrong number of arguments, or a situation type that the behaviour's level doesn't have."""
     conditions = [inner for condition in behavior.conditions for inner in walk(condition)]
     compared = [side for c in conditions if isinstance(c, Comparison) for side in (c.left, c.right)]
     amounts = (*compared, *(effect.amount for effect in behavior.amounts))
@@ -402,10 +385,7 @@ def _check_behavior(behavior: Behavior, domain: Domain) -> None:
 def _situations(
     schema: Parts, read: OntologySchema, classes: dict[str, tuple[str, ...]]
 ) -> tuple[list[SituationType], dict[str, tuple[str, bool]]]:
-    """Return the sorted situation types, and a mapping of each value property to its situation type.
-
-    The mapping also tells whether the type is boolean.
-    """
+    """Return the sorted situation types, and for each value property its situation type and whether the type is boolean."""
     found, properties = [], {}
     for iri in sorted(read.of_kind("SituationType"), key=schema.names.short):
         name = schema.names.short(iri)

@@ -131,10 +131,7 @@ def _not_one_fact(words: Sequence[str]) -> str:
 
 
 def _with_situation(problem: Problem, words: Sequence[str]) -> str:
-    """Return a hint to the only situation type that fits two words, or an empty text.
-
-    A situation type fits if the first word can be its object and the last word can be its value.
-    """
+    """Return a hint to the only situation type for the first word as object and the last as value, or an empty text."""
     about, value = (words[0], words[-1]) if words else ("", "")
     found = [
         each.name

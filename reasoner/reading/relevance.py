@@ -148,7 +148,9 @@ def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
         Situation types that are relevant in addition to the situation types in the task's goals.
     """
     found = Routes(forward=set(known.properties) - known.schema.numbers, classes=_goal_classes(known.schema))
-    counting = {known.names.short(s) for s in _goal_situations(known.schema)} | set(more_situations)
+    goals = [known.schema.nodes.get(iri, {}) for iri in goal_conditions(known.schema)]
+    counting = {known.names.short(s) for goal in goals for s in goal.get(CORE + "situationType", ())}
+    counting |= set(more_situations)
     looked_up: LookedUp = {}
     rules = (rule.behavior for its in known.domain.rules.values() for rule in its)
     aggregates = [_Doing(one.behavior, {*one.kinds}) for one in known.domain.aggregates.values()]
@@ -331,10 +333,7 @@ class _Route:
 
 
 def _steps(condition: Condition, scope: _TypedConjunction, known: Frame) -> Iterator[_Route]:
-    """Yield the routes along stated facts between any two terms of a positive condition.
-
-    A fact that is a node is always followed from its first argument.
-    """
+    """Yield the routes between any two terms of a positive condition; a node is followed from its first argument."""
     arguments: tuple[str, ...]
     match condition:
         case RelationCondition(relation, arguments, False):
@@ -428,10 +427,7 @@ class _RouteSearch(Individuals):
             reached.update(o for s, p, o in triples if s in facts and p in PLACES)
 
     def _close_by_path(self, frontier: set[str], bounds: Routes) -> None:
-        """Read all individuals that the routes reach from given individuals (the frontier).
-
-        More individuals may be read, because a property path ignores constants.
-        """
+        """Read all individuals that the routes reach from a frontier, or more, because a property path ignores constants."""
         ways = [f"<{p}>" for p in sorted(bounds.forward)] + [f"^<{p}>" for p in sorted({*bounds.backward} - {*PLACES})]
         if self.schema.tuples:
             node = "|".join(f"<{p}>" for p in PLACES)
@@ -487,10 +483,6 @@ def _spaces(graph: KnowledgeGraph, schema: OntologySchema, terms: Iterable[str])
     return found
 
 
-def _goal_situations(schema: OntologySchema) -> set[str]:
-    return {s for iri in goal_conditions(schema) for s in schema.nodes.get(iri, {}).get(CORE + "situationType", ())}
-
-
 def _goal_individuals(schema: OntologySchema) -> set[str]:
     """Return the individuals that goals mention, or that facts without arguments mention."""
     goals = [schema.nodes.get(iri, {}) for iri in goal_conditions(schema)]
@@ -508,10 +500,7 @@ def _goal_classes(schema: OntologySchema) -> set[str]:
 
 
 def _named(graph: KnowledgeGraph, schema: OntologySchema, goals: Sequence[str]) -> set[str]:
-    """Return the individuals whose short names occur in the texts of goals.
-
-    The names are looked up in the known namespaces first, and otherwise among all individuals.
-    """
+    """Return the IRIs of the individuals that goals name; known namespaces are searched before all individuals."""
     words = {word.rsplit(":", 1)[-1] for goal in goals for word in goal.split() if not BOUNDS.fullmatch(word)}
     if not words:
         return set()

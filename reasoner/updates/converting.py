@@ -226,10 +226,7 @@ def _to_individuals(file: _File, graph: KnowledgeGraph, own: Sequence[str]) -> C
 def _exchange(
     file: _File, iri: str, links: Sequence[tuple[str, ox.NamedNode | ox.Literal]], behind: Sequence[str]
 ) -> None:
-    """Replace the conditions and effects of a behaviour by the properties and values in `links`.
-
-    The statements `behind` are appended to the behaviour's first statement.
-    """
+    """Replace a behaviour's conditions and effects by the properties in `links`, and append the statements `behind`."""
     node = ox.NamedNode(iri)
     for number, statement in enumerate(file.said[iri]):
         rest = [t for t in statement.triples if t[1].value not in (*LINKS, *TEXT)]

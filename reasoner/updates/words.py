@@ -186,13 +186,7 @@ def _aggregated(head: Triple, select: Any) -> Construction:
 
 
 def _tree(unit: str, text: str, what: str, write: str) -> Any:
-    """Return the syntax tree of a text.
-
-    Raises
-    ------
-    UpdateError
-        The text doesn't match the grammar; the error contains the position at which parsing stopped.
-    """
+    """Return the syntax tree of a text, or raise `UpdateError` with the position at which parsing stopped."""
     try:
         return _grammar(unit).parse_string(text, parse_all=True)
     except pyparsing.ParseBaseException:

@@ -318,10 +318,7 @@ def _flat(conditions: Iterable[tuple[Condition, str]]) -> Iterator[tuple[Conditi
 
 
 def _choice(alternatives: Sequence[Sequence[Condition]]) -> tuple[str, list[str]] | None:
-    """Return the variable and the individuals of a disjunction.
-
-    Return None unless the disjunction just states that a variable denotes one of several individuals.
-    """
+    """Return the variable and the individuals of a disjunction that only lists the individuals of a variable, or None."""
     found: list[str] = []
     name = ""
     for group in alternatives:

@@ -178,7 +178,11 @@ def amounts_out_of_reach(case: Case) -> Iterator[Fault]:
         return
     problem, names = case.reading.problem, case.reading.names
     ranges = _Ranges(problem)
-    waiting = {name: b for name, b in problem.domain.behaviors.items() if b.amounts or _compares(b)}
+    waiting = {
+        name: one
+        for name, one in problem.domain.behaviors.items()
+        if one.amounts or any(isinstance(condition, Comparison) for condition in one.preconditions)
+    }
     for turn in range(ROUNDS + 2 * len(waiting)):
         ready = [b for b in problem.domain.behaviors.values() if not ranges.lacking(b)]
         grown = [ranges.extend(b, turn >= ROUNDS) for b in ready]
@@ -197,10 +201,6 @@ def amounts_out_of_reach(case: Case) -> Iterator[Fault]:
             "correct the amount or the bounds, state another amount in the scene, or add a behaviour that leads to a suitable "
             "amount",
         )
-
-
-def _compares(behavior: Behavior) -> bool:
-    return any(isinstance(condition, Comparison) for condition in behavior.preconditions)
 
 
 class _Ranges:
@@ -269,7 +269,7 @@ class _Ranges:
             same = sum(other.situation == effect.situation for other in behavior.amounts)
             if effect.when or quantity is None or after is None or same > 1:
                 continue
-            amount = _plain_amount(Amount(effect.situation, effect.arguments))
+            amount = counted(Amount(effect.situation, effect.arguments)).replace("?", "")
             if quantity.most is not None and after[0] > quantity.most:
                 limit = f"above its maximum of {written(quantity.most)}"
                 return f"it would make {amount} {_written(after[0])} or more, {limit}", self.about(effect)
@@ -356,10 +356,6 @@ def _written(amount: Fraction | float) -> str:
 
 def _plain(condition: Condition) -> str:
     return said(condition).replace("?", "")
-
-
-def _plain_amount(amount: Amount) -> str:
-    return counted(amount).replace("?", "")
 
 
 def some(names: Sequence[str], most: int = 5) -> str:
