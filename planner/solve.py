@@ -98,6 +98,8 @@ def solve(request: Request) -> Outcome:
         return Outcome(Status.GAVE_UP, reason=OUT_OF_MEMORY)
     except OutOfTimeError as error:
         return Outcome(Status.GAVE_UP, reason=Reason(str(error)))
+    if outcome.status is Status.GAVE_UP and (proof := _last_proof(request.problem, deadline)):
+        outcome = replace(outcome, status=Status.UNSOLVABLE, reason=proof.reason, certificate=proof.certificate)
     if outcome.plan is None:
         with within(deadline):
             return certified(request.problem, outcome)
@@ -143,6 +145,18 @@ def _paper(request: Request) -> Outcome:
         leave_levels=request.leave_levels,
         proof=_proof,
     )
+
+
+def _last_proof(problem: Problem, deadline: Deadline) -> UnsolvableError | None:
+    """Return a proof that few tests find after the search has reached another limit than the time limit."""
+    from confab.planner.hierarchical.planner import SEARCHING
+    from confab.planner.hierarchical.unsolvability import AT_ONCE, impossible
+
+    if deadline.left is not None and deadline.left < (1 - SEARCHING) * deadline.seconds:
+        return None
+    with suppress(OutOfTimeError):
+        return impossible(problem, AT_ONCE, deadline.at)
+    return None
 
 
 def _proof(problem: Problem, states: int, deadline: float | None) -> UnsolvableError | None:

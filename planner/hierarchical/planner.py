@@ -45,8 +45,11 @@ FLAT_ROWS = 30_000
 TRIALS = 1_000_000
 """Maximum number of trials if a level can't be grounded; a trial is the test of one behaviour in one state."""
 NOT_LEFT = "levels must not be left"
-SEARCHING = 0.93
-"""Share of the time limit that is used for search; the other time is for releasing memory."""
+SEARCHING, SHORTENING = 0.93, 0.85
+"""Shares of the time limit after which the search ends, and after which a plan isn't shortened any more.
+
+The other time is for checking the plan, and for releasing memory.
+"""
 
 
 def alone(call: Call) -> None:
@@ -95,7 +98,7 @@ def _plan(
     leave_levels: bool,
     advised: Callable[[Call], None],
 ) -> Outcome:
-    deadline = limits.end(SEARCHING)
+    deadline, until = limits.end(SEARCHING), limits.end(SHORTENING)
     one_level = improve > 0 and len(problem.domain.levels) == 1
     flat = None
     if one_level and advised is alone:
@@ -120,7 +123,7 @@ def _plan(
             if flat.plan is not None:
                 call.steps, call.bound, done = as_refined(call, flat.plan.steps), flat.bound, True
         if done or agenda.achieve_all():
-            call.space.most_work = math.inf
+            call.space.most_work, call.space.deadline = math.inf, until
             plan = shortened(call, improve, leave_levels, advised) if improve else call.tree()
             if not leave_levels and any(step.level != levels[0] for step in plan.steps):
                 return given_up(

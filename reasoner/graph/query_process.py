@@ -18,6 +18,7 @@ from io import BytesIO
 from pathlib import Path
 from subprocess import PIPE, Popen
 from threading import Event, Lock, Timer
+from time import perf_counter
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -175,7 +176,7 @@ class QueryWorker:
         return _checked(self.graph, query, self.limits, found)
 
     def _answer(self, query: str, dataset: Dataset) -> QueryAnswer:
-        late, starting, deadline = Event(), self._process is None, current()
+        late, starting, deadline, begin = Event(), self._process is None, current(), perf_counter()
 
         def interrupt() -> None:
             late.set()
@@ -191,7 +192,8 @@ class QueryWorker:
             self._send((query, *dataset))
         left, process = deadline.left, self._process
         assert process.stdout is not None
-        timer = Timer(self.limits.seconds if left is None else min(left, self.limits.seconds), interrupt)
+        own = self.limits.seconds - (perf_counter() - begin)
+        timer = Timer(own if left is None else min(left, own), interrupt)
         timer.start()
         try:
             found = pickle.load(process.stdout)

@@ -4,7 +4,9 @@ import json
 import math
 from collections.abc import Callable
 from pathlib import Path
-from time import process_time
+from threading import Timer
+from time import perf_counter, process_time, sleep
+from typing import Any
 
 import click
 import pytest
@@ -14,10 +16,15 @@ import confab
 from confab.cli import COMMANDS, app
 from confab.commands.options import Seconds
 from confab.execution import Execution
-from confab.planner.plan import Status
+from confab.planner.hierarchical import planner as hierarchical
+from confab.planner.hierarchical.call import Call
+from confab.planner.hierarchical.shortening import shortened
+from confab.planner.plan import Plan, Status
 from confab.planning import Result
 from confab.reasoner.generate import write_scene
-from confab.reasoner.graph.query_process import QueryLimits
+from confab.reasoner.graph import query_process
+from confab.reasoner.graph.knowledge import KnowledgeGraph
+from confab.reasoner.graph.query_process import QueryLimits, _dumped
 from confab.reasoner.limits import LimitError, OutOfTimeError, current
 from confab.scene import Scene
 from confab.terminal import GAVE_UP
@@ -164,3 +171,35 @@ def test_explaining_a_plan_is_within_the_limit_of_planning_it(monkeypatch: pytes
 def test_a_time_limit_of_a_block_that_is_no_number_is_refused(limit: float) -> None:
     with pytest.raises(TypeError, match="wanted seconds as a number"), confab.within(limit):
         pass
+
+
+def test_the_time_limit_of_a_query_includes_sending_the_scene_to_its_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    limits = list[float]()
+
+    class Recorded(Timer):
+        def __init__(self, seconds: float, function: Callable[[], None]) -> None:
+            limits.append(seconds)
+            super().__init__(seconds, function)
+
+    def slowly(graph: KnowledgeGraph) -> bytes:
+        sleep(0.2)
+        return _dumped(graph)
+
+    monkeypatch.setattr(query_process, "Timer", Recorded)
+    monkeypatch.setattr(query_process, "_dumped", slowly)
+    confab.load("beverage-serving").query("ASK {}", QueryLimits(seconds=30.0))
+    assert limits[0] < 29.9
+
+
+def test_the_last_part_of_the_time_limit_is_for_the_check_of_the_plan(monkeypatch: pytest.MonkeyPatch) -> None:
+    ends = list[float]()
+
+    def recorded(call: Call, *others: Any) -> Plan:
+        assert call.space.deadline is not None
+        ends.append(call.space.deadline)
+        return shortened(call, *others)
+
+    monkeypatch.setattr(hierarchical, "shortened", recorded)
+    begin, limit = perf_counter(), 100.0
+    assert confab.load("two-cups").plan(time_limit=limit, engine="none").solved
+    assert begin + limit * 0.5 < ends[0] < begin + limit * 0.9

@@ -19,7 +19,7 @@ from confab.planner.certificate_checks import refusal
 from confab.planner.certificates import Certificate, certificate_from, certificate_json
 from confab.planner.certified import certified
 from confab.planner.certifying import certify
-from confab.planner.plan import Outcome, Reason, Status
+from confab.planner.plan import Limits, Outcome, Reason, Status
 from confab.planner.possibilities import Lowest
 from confab.planner.solve import MODES, Mode, Request, solve
 from confab.reasoner.amounts import Quantity
@@ -50,6 +50,18 @@ BAYS = ["acid2 IN bay1", "base2 IN bay2", "bleach IN bay3", "fuel IN bay5", "per
 
 def answered(case: str, mode: Mode) -> Outcome:
     return confab.load(CASES / case).plan(mode=mode, time_limit=20.0).outcome
+
+
+@pytest.mark.parametrize("mode", ["guarded", "paper", "optimal"])
+def test_a_search_that_reaches_its_limit_of_expansions_looks_for_a_certificate(mode: Mode) -> None:
+    unsolvable = 0
+    for seed in range(4_100_000, 4_100_006):
+        problem = hierarchy(seed)
+        if solvable(problem, most=3_000) is False:
+            outcome = solve(Request(problem, mode, Limits(expansions=1)))
+            assert (outcome.status, outcome.certificate is None) == (Status.UNSOLVABLE, False), seed
+            unsolvable += 1
+    assert unsolvable
 
 
 @pytest.mark.parametrize("mode", [mode for mode in MODES if mode != "leading"])
