@@ -19,7 +19,7 @@ from confab.planner.acting.failure_memory import Caution
 from confab.planner.acting.retries import RetryPolicy
 from confab.planner.acting.symbolic_world import SymbolicWorld, place_symbols, with_individual
 from confab.planner.acting.world import World
-from confab.planner.plan import Plan, Planner, SoftGoal, Step, renumbered
+from confab.planner.plan import Plan, Planner, SoftGoal
 from confab.planner.solve import DEFAULT_MODE, Mode
 from confab.planner.validation import open_goals
 from confab.reasoner.aggregates.totals import exceptions
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     from confab.known import Known
     from confab.memory import Memory
     from confab.show import PlanTree
-    from confab.sim.live import LiveWorld
     from confab.sim.world import PhysicsWorld
 
 WORLDS = ("symbolic", "pybullet")
@@ -582,8 +581,7 @@ def execute(
     noise : float
         Standard deviation of perceived positions in PyBullet, in metres.
     both_hands : bool
-        In PyBullet, execute the plan with all hands at once, and then execute the remaining steps one after another.
-        Interventions aren't allowed.
+        In PyBullet, execute the plan with all hands at once. After a failure, execute the remaining steps one after another.
 
     Raises
     ------
@@ -596,8 +594,8 @@ def execute(
     check_noise(noise)
     if noise and world != "pybullet":
         raise KnowledgeError(f"noise of {noise:g} m: only in the world pybullet, since nothing is measured elsewhere")
-    if both_hands and (world != "pybullet" or wanted):
-        raise KnowledgeError("both hands at once: only in the world pybullet, and without interventions")
+    if both_hands and world != "pybullet":
+        raise KnowledgeError("both hands at once: only in the world pybullet")
     if world == "symbolic":
         world = SymbolicWorld(problem)
     elif isinstance(world, str) and ":" in world:
@@ -631,9 +629,8 @@ def execute(
         for intervention in wanted:
             if (why := live.impossible(intervention)) is not None:
                 raise KnowledgeError(f"'{intervention.text}' can't happen in PyBullet: {why}")
-        if both_hands:
-            return Execution(scene, _with_both_hands(problem, live, plan, planner, retry_policy, observer, caution))
-        return Execution(scene, act(problem, live, plan, wanted, planner, retry_policy, observer, True, caution))
+        episode = act(problem, live, plan, wanted, planner, retry_policy, observer, True, caution, both_hands)
+        return Execution(scene, episode)
 
 
 def _reach_of(scene: Known) -> str:
@@ -644,58 +641,3 @@ def _reach_of(scene: Known) -> str:
         return scene.names.short(reach_relation(scene.knowledge))
     except KnowledgeError:
         return ""
-
-
-def _with_both_hands(
-    problem: Problem,
-    live: LiveWorld,
-    plan: Plan | None,
-    planner: Planner | None,
-    retry_policy: RetryPolicy,
-    observer: Callable[[Event], None] | None,
-    caution: Caution | None,
-) -> Episode:
-    """Execute a plan with all hands at once until it ends or fails; then reach the remaining goals in a closed loop."""
-    from confab.planner.acting.episode import ExecutedPrimitive, Failure, changes
-    from confab.planner.hierarchical.planner import plan as hierarchical_plan
-    from confab.sim.together import perform_together
-
-    if plan is None:
-        begin, limits = planner or hierarchical_plan, retry_policy.planning
-        end = limits.end()
-        known = problem if caution is None else caution.applied(problem, begin, limits)
-        plan = begin(known, limits=limits.until(end)).plan or Plan(())
-    done = perform_together(live.world, problem, plan.primitives)
-    if not done.ok:
-        live.take_stock()
-    before = [
-        ExecutedPrimitive(slot.step, slot.begin, slot.end, verdict.ok, verdict.code)
-        for slot, verdict in zip(done.slots, done.verdicts, strict=True)
-    ]
-    now = live.observe()
-    failures = [
-        Failure(slot.step, verdict.code or "failed", verdict.objects, verdict.message, now)
-        for slot, verdict in zip(done.slots, done.verdicts, strict=True)
-        if not verdict.ok
-    ]
-    rest = act(replace(problem, initial=now), live, None, (), planner, retry_policy, observer, True, caution)
-    carried = {event.step.path for event in before if event.ok}
-    steps = (*_only(plan.steps, carried), *renumbered(rest.done.steps, len(plan.steps)))
-    return replace(
-        rest,
-        planned=plan,
-        done=Plan(steps),
-        initial=problem.initial,
-        events=(*before, *rest.events),
-        failures=(*failures, *rest.failures),
-        course=(
-            *changes(problem.initial, rest.initial, max((event.end for event in before), default=0.0)),
-            *rest.course,
-        ),
-    )
-
-
-def _only(steps: Iterable[Step], paths: set[tuple[int, ...]]) -> tuple[Step, ...]:
-    """Return the trees of steps with only the primitives at the given paths, and the steps above these primitives."""
-    kept = [replace(step, steps=_only(step.steps, paths)) if step.steps else step for step in steps]
-    return tuple(step for step in kept if step.steps or step.path in paths)

@@ -8,13 +8,14 @@ Rule 4: an object that stands at no place of the scene gets a new place, a spot 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import replace
 
 import numpy as np
 
 from confab.planner.acting.discovery import Discovery
 from confab.planner.acting.episode import Intervention, InterventionKind
+from confab.planner.acting.schedule import WorkerSlot
 from confab.planner.acting.symbolic_world import disturbed, with_individual
 from confab.planner.acting.world import INTERRUPTED
 from confab.planner.plan import Step
@@ -27,6 +28,7 @@ from confab.sim.interventions import DISTURBERS, HANDLED, move, put_box
 from confab.sim.lookout import Lookout
 from confab.sim.perception import tilt_of
 from confab.sim.skills import perform
+from confab.sim.together import perform_together
 from confab.sim.verdict import SkillError, Verdict
 from confab.sim.world import PhysicsWorld
 
@@ -66,6 +68,7 @@ class LiveWorld:
         self.waiting: list[Intervention] = []
         self.stopping = False
         self.concerned: set[str] = set()
+        self.changed: set[str] | None = None  # while several hands work: the individuals that interventions changed
         self.planted = world.disturb  # a fault that was planted earlier
         world.disturb = self._each_step
 
@@ -115,6 +118,27 @@ class LiveWorld:
         if not verdict.ok:
             self.take_stock()
         return verdict
+
+    def execute_together(
+        self, problem: Problem, primitives: Sequence[Step], may_begin: Callable[[Set[tuple[int, ...]]], bool]
+    ) -> list[tuple[WorkerSlot, Verdict]]:
+        """Execute primitives with all hands at once, and return the primitives that ended, in the order of their begins.
+
+        An intervention stops the running primitives of the objects that it changes; the other running primitives end.
+        """
+        self.changed = set()
+
+        def changed() -> set[str]:
+            now, self.changed = self.changed or set(), set()
+            return now
+
+        try:
+            done = perform_together(self.world, problem, primitives, may_begin=may_begin, changed=changed)
+        finally:
+            self.changed = None
+        if not done.ok:
+            self.take_stock()
+        return list(zip(done.slots, done.verdicts, strict=True))
 
     def stop(self) -> None:
         """Stop the running primitive at its next simulation step."""
@@ -195,6 +219,8 @@ class LiveWorld:
             named = _named(intervention)
             self.world.moved_by_others = self.world.moved_by_others | named  # these objects were not moved by the hand
             happened = happened or not named.isdisjoint(self.concerned)
+            if self.changed is not None:
+                self.changed |= named
         if happened:
             raise SkillError(INTERRUPTED, tuple(sorted(self.concerned)), "an intervention changed an object of it")
 

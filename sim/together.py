@@ -7,7 +7,7 @@ fixed order, so that equal calls give equal results.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass
 from threading import Semaphore, Thread
 
@@ -15,9 +15,10 @@ import numpy as np
 import pybullet
 
 from confab.planner.acting.schedule import WorkerSlot, partial_order, ready, urgency_of, worker_of, workers_of
+from confab.planner.acting.world import INTERRUPTED
 from confab.planner.plan import Step
 from confab.reasoner.symbols import Problem
-from confab.sim.verdict import Verdict
+from confab.sim.verdict import SkillError, Verdict
 from confab.sim.world import PhysicsWorld
 
 ROOM = 0.25
@@ -53,6 +54,7 @@ class _RunningPrimitive:
     def __init__(self, world: PhysicsWorld, step: Step, position: int, worker: str) -> None:
         self.step, self.position, self.worker, self.begin = step, position, worker, world.seconds
         self.moved_by_others: set[str] = set()
+        self.interrupted = False
         self.verdict: Verdict | None = None
         self.error: BaseException | None = None
         self.go, self.paused = Semaphore(0), Semaphore(0)
@@ -78,10 +80,19 @@ class _RunningPrimitive:
         """Wait for a simulation step of the world; the job's thread calls this method."""
         self.paused.release()
         self.go.acquire()
+        if self.interrupted:
+            self.interrupted = False
+            raise SkillError(INTERRUPTED, self.step.arguments, "an intervention changed an object of it")
 
 
 def perform_together(
-    world: PhysicsWorld, problem: Problem, primitives: Sequence[Step], room: float = ROOM, most: float = 600.0
+    world: PhysicsWorld,
+    problem: Problem,
+    primitives: Sequence[Step],
+    room: float = ROOM,
+    most: float = 600.0,
+    may_begin: Callable[[Set[tuple[int, ...]]], bool] = lambda done: True,
+    changed: Callable[[], Set[str]] = frozenset,
 ) -> Performance:
     """Execute primitives with all hands at once; each starts when its predecessors are done and no other hand works too near.
 
@@ -95,6 +106,11 @@ def perform_together(
         Minimum distance in metres between the places at which two hands work at the same time.
     most : float
         Simulated seconds after which the execution is given up.
+    may_begin : callable
+        Function of the paths of the finished primitives that returns whether further primitives may begin.
+    changed : callable
+        Function that returns the individuals that an intervention has changed since the last call. Running primitives of these
+        individuals are interrupted.
     """
     order, workers = partial_order(problem, primitives), workers_of(problem)
     urgency = urgency_of(order)
@@ -123,8 +139,9 @@ def perform_together(
         while len(done) < len(primitives) and world.seconds < most:
             if all(verdict.ok for _, verdict in done.values()):
                 running = [job.position for job in jobs]
-                for i in ready(order, primitives, workers, [*done, *running], running, urgency, apart):
-                    jobs.append(_RunningPrimitive(world, primitives[i], i, worker_of(primitives[i], workers)))
+                new = ready(order, primitives, workers, [*done, *running], running, urgency, apart)
+                if new and may_begin({slot.step.path for slot, _ in done.values()}):
+                    jobs += [_RunningPrimitive(world, primitives[i], i, worker_of(primitives[i], workers)) for i in new]
             if not jobs:
                 break
             for job in list(jobs):
@@ -140,6 +157,10 @@ def perform_together(
                     done[job.position] = slot, job.verdict
                     jobs.remove(job)
             step_once(1)
+            moved = changed()
+            for job in jobs:
+                job.moved_by_others |= moved
+                job.interrupted = job.interrupted or not moved.isdisjoint(_concerned(world, job.step))
             if world.steps % LOOKING == 0 and arms_touch(world):
                 touching += LOOKING
     finally:
@@ -163,11 +184,15 @@ def arms_touch(world: PhysicsWorld) -> bool:
     return False
 
 
+def _concerned(world: PhysicsWorld, step: Step) -> set[str]:
+    """Return the individuals of a primitive: its arguments, and the bodies that its hands hold."""
+    named = {*step.arguments, *step.bindings.values()}
+    return named | {held for hand in named & world.hands.keys() if (held := world.held(hand)) is not None}
+
+
 def _moved_bodies(world: PhysicsWorld, step: Step) -> set[str]:
     """Return the bodies that a primitive may move: the bodies among its arguments, and the bodies that its hands hold."""
-    named = {*step.arguments, *step.bindings.values()}
-    held = {world.held(hand) for hand in named & world.hands.keys()}
-    return {name for name in named | held if name is not None and name in world.bodies}
+    return _concerned(world, step) & world.bodies.keys()
 
 
 def _workplace(

@@ -14,7 +14,7 @@ are counted and planning has limits.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from time import perf_counter
@@ -36,7 +36,7 @@ from confab.planner.acting.failure_memory import Caution, refuted_by, relied_on_
 from confab.planner.acting.record import Record
 from confab.planner.acting.repair import difference, repair_or_replan, replan, vanished
 from confab.planner.acting.retries import DEFAULT, Retries, RetryPolicy
-from confab.planner.acting.step_trees import all_steps, first_chain, tree_of, without_first
+from confab.planner.acting.step_trees import all_steps, chains_of, first_chain, tree_of, without, without_first
 from confab.planner.acting.unreached import blamed, blocked, with_discoveries
 from confab.planner.acting.world import INTERRUPTED, WITHOUT_EFFECT, Guarded, Verdict, World, WorldError, WorldReport
 from confab.planner.hierarchical.planner import plan as hierarchical_plan
@@ -57,6 +57,7 @@ def act(
     observer: Callable[[Event], None] | None = None,
     repairs: bool = True,
     caution: Caution | None = None,
+    together: bool = False,
 ) -> Episode:
     """Execute a task in a world until all goals are achieved, the task is proved impossible, or a limit is reached.
 
@@ -79,6 +80,8 @@ def act(
         If false, the executive plans from scratch instead of repairing the plan.
     caution : Caution, optional
         Failures in earlier episodes; unreliable facts and behaviours are avoided if there is an alternative.
+    together : bool
+        Whether several actors execute primitives at once, until a primitive fails; the world must be `Concurrent`.
 
     Returns
     -------
@@ -87,7 +90,14 @@ def act(
     if caution is not None and plan is None:
         problem = caution.applied(problem, planner or hierarchical_plan, retry_policy.planning)
     run = _RunningEpisode(
-        Belief(problem), Guarded(world), list(interventions), planner, Retries(retry_policy), observer, repairs
+        Belief(problem),
+        Guarded(world),
+        list(interventions),
+        planner,
+        Retries(retry_policy),
+        observer,
+        repairs,
+        together,
     )
     try:
         run.look(run.belief.state)
@@ -101,6 +111,8 @@ def act(
                 run.finish()
             elif (expected := run.expected()) is None:
                 run.request_replan("the next primitive's precondition doesn't hold")
+            elif run.together:
+                run.perform_together()
             else:
                 chain, before, verdict = run.perform(expected)
                 if not verdict.ok:
@@ -125,6 +137,7 @@ class _RunningEpisode:
     retries: Retries
     observer: Callable[[Event], None] | None
     repairs: bool
+    together: bool
     going: bool = True
     goals: Postponed = field(default_factory=Postponed)
     request: ReplanRequest = field(default_factory=ReplanRequest)
@@ -243,6 +256,48 @@ class _RunningEpisode:
             self.give_up(Reason(f"stopped at the limit of {self.retries.most} primitives"))
         return chain, before, verdict
 
+    def perform_together(self) -> None:
+        """Execute the remaining primitives with all actors at once, until all have ended or something unexpected happens.
+
+        The world is observed afterwards. After a failure, the episode continues with one primitive at a time.
+        """
+        record, state, finished = self.record, self.belief.problem.initial, set[tuple[int, ...]]()
+        chains = {chain[-1].path: chain for chain in chains_of(self.agenda.steps)}
+        ended = self.world.execute_together(
+            self.belief.problem, [chain[-1] for chain in chains.values()], lambda done: not self.due(done)
+        )
+        self.note_what_happened_by_the_clock()
+        seen, problem = self.world.observe(), self.belief.problem
+        failed = list[tuple[tuple[Step, ...], State, Verdict]]()
+        for slot, verdict in ended:
+            step, chain = slot.step, chains[slot.step.path]
+            for above in chain[:-1]:
+                self.agenda.begun.setdefault(above.path, state)
+            after = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, state) or state
+            changes = [Fact(s, v) for s, v in sorted(after.items()) if state.get(s) != v]
+            there = bool(changes) and all(seen.get(fact.symbol) == fact.value for fact in changes)
+            relied_on = tuple(relied_on_by(problem, chain))
+            record.events.append(ExecutedPrimitive(step, slot.begin, slot.end, verdict.ok, verdict.code, (), relied_on))
+            if verdict.ok or (there and verdict.code != INTERRUPTED):
+                record.done.update((above.path, above) for above in chain)
+                finished.add(step.path)
+                record.changes(state, after, slot.end)
+                state = after
+            if not verdict.ok:
+                failed.append((chain, state, verdict))
+            self.say("end", step, changes)
+        record.course.sort(key=lambda change: change.seconds)
+        self.agenda.steps = without(self.agenda.steps, finished)
+        self.belief.problem = replace(problem, initial=state)
+        surprises = self.look(dict(state), seen)
+        if surprises or self.agenda.steps:
+            self.request_replan("; ".join(map(_told, surprises[:3])) or "the actors were interrupted", surprises)
+        if len(record.events) >= self.retries.most:
+            self.give_up(Reason(f"stopped at the limit of {self.retries.most} primitives"))
+        for chain, before, verdict in failed:
+            self.together = self.together and verdict.code == INTERRUPTED
+            self.learn_from(chain, before, verdict)
+
     def without_effect(self, changes: Sequence[Fact], seen: State) -> bool:
         """Return whether some of the expected changes are perceptible, but none of them was perceived."""
         found = [
@@ -276,14 +331,7 @@ class _RunningEpisode:
 
     def intervene(self) -> None:
         """Execute the interventions that are due after the last primitive."""
-        if not self.waiting:
-            return
-        done = self.record.done
-        gone = set(done) - {step.path for step in all_steps(self.agenda.steps[:1])}
-        first = self.belief.problem.domain.levels[0]
-        finished = {one.id for path in gone if done[path].level == first for one in done[path].together}
-        due = [i for i in self.waiting if (i.after in finished if isinstance(i.after, int) else i.after in gone)]
-        due += [i for i in self.waiting if i.at is not None and not i.of_world and i.at <= self.world.seconds]
+        due = [i for i in self.due() if i.at is None or not i.of_world]
         for intervention in due:
             self.waiting.remove(intervention)
             now = self.world.seconds
@@ -293,6 +341,19 @@ class _RunningEpisode:
         if any(i.of_world for i in due):
             surprises = self.look(self.belief.state)
             self.request_replan("; ".join(map(_told, surprises[:3])), surprises)
+
+    def due(self, finished: Container[tuple[int, ...]] = ()) -> list[Intervention]:
+        """Return the interventions that are due when, beside the recorded primitives, those at some paths have finished."""
+        if not self.waiting:
+            return []
+        steps = self.agenda.steps if self.together else self.agenda.steps[:1]
+        left = {step.path for step in all_steps(without(steps, finished))}
+        gone = {step.path: step for step in (*self.record.done.values(), *all_steps(steps))}
+        gone = {path: step for path, step in gone.items() if path not in left}
+        first = self.belief.problem.domain.levels[0]
+        ids = {one.id for step in gone.values() if step.level == first for one in step.together}
+        due = [i for i in self.waiting if (i.after in ids if isinstance(i.after, int) else i.after in gone)]
+        return due + [i for i in self.waiting if i.at is not None and i.at <= self.world.seconds]
 
     def note_what_happened_by_the_clock(self) -> None:
         """Record announced interventions whose time has passed."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from confab.planner.plan import Step
@@ -22,6 +22,20 @@ def without_first(steps: Sequence[Step]) -> tuple[Step, ...]:
         return tuple(steps[1:])
     below = without_first(steps[0].steps)
     return (replace(steps[0], steps=below), *steps[1:]) if below else tuple(steps[1:])
+
+
+def chains_of(steps: Sequence[Step]) -> Iterator[tuple[Step, ...]]:
+    """Yield each primitive below the steps, preceded by all its ancestors."""
+    for step in steps:
+        yield from ((step, *below) for below in chains_of(step.steps)) if step.steps else ((step,),)
+
+
+def without(steps: Sequence[Step], paths: Container[tuple[int, ...]]) -> tuple[Step, ...]:
+    """Return the steps without the primitives at some paths, and without parents that have no other primitive."""
+    left = (replace(step, steps=without(step.steps, paths)) if step.steps else step for step in steps)
+    return tuple(
+        one for step, one in zip(steps, left, strict=True) if one.steps or not (step.steps or step.path in paths)
+    )
 
 
 def all_steps(steps: Sequence[Step]) -> Iterator[Step]:

@@ -7,7 +7,7 @@ Another thread may call `stop` while `execute` runs, and the executive calls `st
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from threading import Timer
@@ -17,10 +17,11 @@ from confab.planner.acting.discovery import Discovery
 from confab.planner.plan import Step
 from confab.reasoner.limits import current
 from confab.reasoner.possible import ImpossibleStateError
-from confab.reasoner.symbols import Fact, State, Symbol
+from confab.reasoner.symbols import Fact, Problem, State, Symbol
 
 if TYPE_CHECKING:
     from confab.planner.acting.episode import Intervention
+    from confab.planner.acting.schedule import WorkerSlot
 
 logger = logging.getLogger(__name__)
 
@@ -99,6 +100,18 @@ class Disturbable(World, Protocol):
         """Record interventions with their times on the world's clock."""
 
 
+class Concurrent(World, Protocol):
+    """A world in which several actors execute primitives at once."""
+
+    def execute_together(
+        self, problem: Problem, primitives: Sequence[Step], may_begin: Callable[[Set[tuple[int, ...]]], bool]
+    ) -> Sequence[tuple[WorkerSlot, Verdict]]:
+        """Execute primitives in their necessary order, and return the primitives that ended, in the order of their begins.
+
+        No primitive begins after a failure, nor while `may_begin` returns false for the paths of the finished primitives.
+        """
+
+
 @runtime_checkable
 class Discoverer(Protocol):
     """A world that discovers individuals that the scene doesn't contain."""
@@ -160,6 +173,14 @@ class Guarded:
                 f"the world's execute({step}) returned {said!r:.60} without {', '.join(lacking)}; wanted a verdict"
             )
         return said
+
+    def execute_together(
+        self, problem: Problem, primitives: Sequence[Step], may_begin: Callable[[Set[tuple[int, ...]]], bool]
+    ) -> Sequence[tuple[WorkerSlot, Verdict]]:
+        """Execute primitives with several actors at once, as `Concurrent.execute_together`."""
+        world: Concurrent = self.world  # type: ignore[assignment]  # the caller knows that the world is concurrent
+        with _asking("execute_together()"):
+            return world.execute_together(problem, primitives, may_begin)
 
     def stop(self) -> None:
         """Stop the running primitive; ignore an error raised by the world's `stop`."""
