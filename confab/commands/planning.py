@@ -287,7 +287,7 @@ def verify(
 @SCENE_IRI
 @click.option("--perturb", is_flag=True, help="Vary poses, friction, masses and filled amounts.")
 @NOISE
-@click.option("--both-hands", is_flag=True, help="In PyBullet: execute with all hands at once, without interventions.")
+@click.option("--both-hands", is_flag=True, help="In PyBullet: execute with all hands at once.")
 @click.option("--learn", is_flag=True, help="Learn from the episode and its failures into --memory.")
 @TIME_LIMIT
 @click.option(

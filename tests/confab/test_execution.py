@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from io import StringIO
+from itertools import combinations
 from pathlib import Path
 
 import pytest
@@ -299,3 +300,18 @@ def test_both_hands_in_pybullet_are_faster_and_never_touch() -> None:
     assert episode.failures == ()
     assert episode.done == episode.planned
     assert episode.seconds["simulated"] <= 0.75 * sum(event.end - event.begin for event in episode.events)
+
+
+@pytest.mark.slow
+def test_an_intervention_while_both_hands_move_stops_only_the_hand_of_its_object_and_both_hands_go_on() -> None:
+    run = confab.load("beverage-serving").execute(
+        interventions="at=8.2 cup2 LOCATION location8", world="pybullet", both_hands=True
+    )
+    episode = run.episode
+    ((_, at),) = episode.interventions
+    moving = [event for event in episode.events if event.begin < at <= event.end]
+    assert run.reached
+    assert [event.code for event in moving if "cup2" in event.step.arguments] == ["interrupted"]
+    assert [event.ok for event in moving if "cup2" not in event.step.arguments] == [True]
+    later = [event for event in episode.events if event.begin > at]
+    assert any(one.begin < other.end and other.begin < one.end for one, other in combinations(later, 2))
