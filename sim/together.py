@@ -18,6 +18,7 @@ from confab.planner.acting.schedule import WorkerSlot, partial_order, ready, urg
 from confab.planner.acting.world import INTERRUPTED
 from confab.planner.plan import Step
 from confab.reasoner.symbols import Problem
+from confab.sim.engine import Engine
 from confab.sim.verdict import SkillError, Verdict
 from confab.sim.world import PhysicsWorld
 
@@ -171,7 +172,7 @@ def perform_together(
     )
 
 
-def arms_touch(world: PhysicsWorld) -> bool:
+def arms_touch(world: Engine) -> bool:
     """Return whether two hands of the world, including their arms, touch each other."""
     owner: dict[tuple[int, int], str] = {}
     for name, hand in world.hands.items():
