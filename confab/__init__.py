@@ -21,9 +21,8 @@ from __future__ import annotations
 
 import sys as _sys
 
-TYPE_CHECKING = (
-    False  # instead of `from typing import TYPE_CHECKING`: Ctrl-C during that import would print a traceback
-)
+# instead of `from typing import TYPE_CHECKING`: Ctrl-C during that import would print a traceback
+TYPE_CHECKING = False
 if TYPE_CHECKING:
     from confab.authoring import generate, new_domain, validate
     from confab.curve import Curve, practise

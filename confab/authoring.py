@@ -172,19 +172,14 @@ class Difference:
         """Return the difference as lines that start with ``+`` and ``-``."""
         lines = []
         for kind in self.gained:
-            lines += [f"- {kind} {name}" for name in self.lost[kind]] + [
-                f"+ {kind} {name}" for name in self.gained[kind]
-            ]
+            lines += [f"- {kind} {name}" for name in self.lost[kind]]
+            lines += [f"+ {kind} {name}" for name in self.gained[kind]]
         if self.before == self.after:
             return "\n".join([*lines, f"the plan is the same: {len(self.after)} steps"])
         import difflib
 
-        return "\n".join(
-            [
-                *lines,
-                *list(difflib.unified_diff(self.before, self.after, "plan before", "plan after", lineterm="", n=1)),
-            ]
-        )
+        changes = difflib.unified_diff(self.before, self.after, "plan before", "plan after", lineterm="", n=1)
+        return "\n".join([*lines, *changes])
 
 
 def difference(old: Scene, new: Scene, mode: Mode) -> Difference:
@@ -239,10 +234,8 @@ def unknown_terms(memory: MemoryLines, scene: Known) -> list[str]:
             if isinstance(t.object, ox.NamedNode)
             and (t.predicate.value in TERMS or (t.subject in kinds and t.predicate.value in ROLES))
         }
-    graph, made = (
-        scene.knowledge,
-        scene.names.iris,
-    )  # the reader makes situation types, such as "ended" of an at-most-once type
+    # the reader makes situation types, such as "ended" of an at-most-once type
+    graph, made = scene.knowledge, scene.names.iris
     asked = " ".join(str(ox.NamedNode(iri)) for iri in sorted(spoken.difference(made)))
     rows = graph.select(f"SELECT ?x WHERE {{ VALUES ?x {{ {asked} }} FILTER EXISTS {{ ?x ?p ?o }} }}") if asked else []
     unknown = sorted(spoken.difference(made) - {x.value for (x,) in rows if isinstance(x, ox.NamedNode)})

@@ -82,9 +82,8 @@ def plan_by_engine(
         The engine or the level doesn't exist, or the problem has derived predicates or amounts and the engine doesn't support
         them.
     """
-    with within(
-        ENGINE_SECONDS if seconds is None else seconds
-    ) as deadline:  # the limit includes the export and the imports
+    # the limit includes the export and the imports
+    with within(ENGINE_SECONDS if seconds is None else seconds) as deadline:
         return _planned(problem, engine, level, deadline)
 
 
@@ -216,13 +215,10 @@ def solved(domain: str, problem: str, engine: str | None, seconds: float | None)
     from unified_planning.io import PDDLReader
 
     environment = Environment()
-    environment.error_used_name, environment.credits_stream = (
-        False,
-        None,
-    )  # a type and a predicate may have the same name
-    environments.GLOBAL_ENVIRONMENT = (
-        environment  # the reader of unified-planning makes metrics in the global environment
-    )
+    # a type and a predicate may have the same name
+    environment.error_used_name, environment.credits_stream = False, None
+    # the reader of unified-planning makes metrics in the global environment
+    environments.GLOBAL_ENVIRONMENT = environment
     factory = environment.factory
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

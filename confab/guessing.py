@@ -219,10 +219,8 @@ def described(kind: str) -> Mapping[str, str]:
     """Return the public names of a class, or of the module `confab`, each with the first line of its docstring."""
     if kind == "confab":
         module = import_module("confab")
-        names = [
-            "Memory",
-            *(n for n in module.__all__ if n.islower()),
-        ]  # `Memory` is the only class whose constructor users call
+        # `Memory` is the only class whose constructor users call
+        names = ["Memory", *(n for n in module.__all__ if n.islower())]
         return {**{n: (getattr(module, n).__doc__ or "").split("\n")[0] for n in names}, "__version__": ""}
     home, _, name = CLASSES[kind].rpartition(".")
     cls = getattr(import_module(home), name)

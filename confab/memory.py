@@ -23,7 +23,6 @@ from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.memory.experience import (
     ITSELF,
     Experience,
-    GoalKind,
     LearnedOrder,
     LearnedRule,
     LearningError,
@@ -32,16 +31,7 @@ from confab.reasoner.memory.experience import (
     Statistics,
     Tally,
 )
-from confab.reasoner.memory.experience_file import (
-    FORMAT,
-    MemoryLines,
-    new_replica,
-    parse,
-    probability,
-    pull,
-    push,
-    turtle,
-)
+from confab.reasoner.memory.experience_file import MemoryLines, new_replica, parse, pull, push, turtle
 from confab.reasoner.memory.links import Links
 from confab.reasoner.memory.links_file import links_text, load_links, memory_lines, memory_names
 from confab.reasoner.names import Names, RightNames, right_names
@@ -524,9 +514,6 @@ def failed_steps(problem: Problem, episode: Episode) -> Iterator[tuple[Problem, 
                 for state in (failure.state, episode.initial):
                     yield replace(problem, initial=state, goal=episode.goal), step, failure.step.path
                 break
-
-
-__all__ = ["FORMAT", "GoalKind", "LearnedOrder", "Memory", "probability"]
 
 
 def _scene_and_plan(scene: Known | HasSceneAndPlan, plan: AnyPlan | None) -> tuple[Known, AnyPlan]:

@@ -49,9 +49,8 @@ def run_to_end(call: Callable[[], int | None]) -> NoReturn:
         code = _interruptible(call) or YES  # a command without an exit code returns None
         sys.stdout.flush()
     except SystemExit as error:
-        closed = (
-            "PacifyFlush" in type(sys.stdout).__name__
-        )  # click has replaced stdout if the reader of a pipe has ended
+        # click has replaced stdout if the reader of a pipe has ended
+        closed = "PacifyFlush" in type(sys.stdout).__name__
         sys.exit(PIPE_CLOSED if closed else error.code)
     except click.ClickException as error:
         _end(MISUSE, _usage(error))

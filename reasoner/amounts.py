@@ -47,9 +47,8 @@ class Quantity:
     @cached_property
     def _bounds(self) -> tuple[Number, Number]:
         """The bounds of the amounts; whole bounds are integers, because integers are compared much faster than fractions."""
-        return -inf if self.least is None else simplified(self.least), inf if self.most is None else simplified(
-            self.most
-        )
+        least = -inf if self.least is None else simplified(self.least)
+        return least, inf if self.most is None else simplified(self.most)
 
     def allows(self, amount: Number) -> bool:
         """Return whether an amount is a number within the bounds, and a whole number if this is required."""

@@ -156,9 +156,8 @@ class Attempt:
                     _scene(reacher, *movers, stage, min(CLOSE, least) if stage.near else least) for stage in stages
                 ]
                 found = _free(scenes, solved, order)
-                if (
-                    found
-                ):  # with noise the last margin is below zero, since an obstacle may be farther away than perceived
+                # with noise the last margin is below zero, since an obstacle may be farther away than perceived
+                if found:
                     break
             if not found:
                 raise _blocked(scenes, [q[order] for q in solved], stages, objects)

@@ -72,7 +72,10 @@ def fault(plant: Callable[Concatenate[Engine, P], None]) -> Callable[P, PlantedF
 
 
 def later(world: Engine, step: int, seconds: float, act: Callable[[Engine], None]) -> None:
-    """Call `act` once, `seconds` of simulated time after the beginning of primitive number `step`."""
+    """Call `act` once, `seconds` of simulated time after the beginning of primitive `step`; at once if `step` is negative."""
+    if step < 0:
+        act(world)
+        return
     began: int | None = None
     earlier = world.disturb
 
@@ -145,10 +148,7 @@ def displaced(world: Engine, body: str, by: tuple[float, float], step: int = -1,
     def shift(world: Engine) -> None:
         _put(world, body, world.truth(body)[1] + np.array([*by, 0.0]))
 
-    if step < 0:
-        shift(world)
-    else:
-        later(world, step, seconds, shift)
+    later(world, step, seconds, shift)
 
 
 @fault
@@ -173,10 +173,7 @@ def gone(world: Engine, body: str, step: int = -1, seconds: float = 0.0) -> None
         del world.names[thing.body]
         pybullet.removeBody(thing.body, physicsClientId=world.client)
 
-    if step < 0:
-        take(world)
-    else:
-        later(world, step, seconds, take)
+    later(world, step, seconds, take)
 
 
 @fault
@@ -198,14 +195,13 @@ def heavy(world: Engine, body: str, mass: float) -> None:
 @fault
 def slippery(world: Engine, body: str, friction: float = 0.022) -> None:
     """Give an object another coefficient of friction."""
-    pybullet.changeDynamics(
-        world.bodies[body].body,
-        -1,
-        lateralFriction=friction,
-        spinningFriction=0,
-        rollingFriction=0,
-        physicsClientId=world.client,
-    )
+    _smooth(world, world.bodies[body].body, -1, friction)
+
+
+def _smooth(world: Engine, body: int, link: int, friction: float) -> None:
+    """Set the coefficient of friction of a link, which doesn't resist spinning and rolling."""
+    client = {"physicsClientId": world.client}
+    pybullet.changeDynamics(body, link, lateralFriction=friction, spinningFriction=0, rollingFriction=0, **client)
 
 
 @fault
@@ -288,10 +284,7 @@ def stopped(world: Engine, link: str, lower: float, upper: float, step: int = -1
             physicsClientId=world.client,
         )
 
-    if step < 0:
-        stop(world)
-    else:
-        later(world, step, seconds, stop)
+    later(world, step, seconds, stop)
 
 
 @fault
@@ -335,14 +328,7 @@ def unlatched(world: Engine, link: str) -> None:
 def greasy(world: Engine, link: str, friction: float = 0.01) -> None:
     """Give a link, including its handle, another coefficient of friction."""
     mechanic = world.links[link]
-    pybullet.changeDynamics(
-        mechanic.body,
-        mechanic.joints[link],
-        lateralFriction=friction,
-        spinningFriction=0,
-        rollingFriction=0,
-        physicsClientId=world.client,
-    )
+    _smooth(world, mechanic.body, mechanic.joints[link], friction)
 
 
 # ------------------------------------------------------------------------------------------------- the robot

@@ -60,9 +60,8 @@ class PhysicsWorld(Engine):
         joints = [Symbol(use.situation, (link,)) for use in embodiment.perceivers.values() for link in use.links]
         measured = [Symbol(use.situation, one) for use in embodiment.perceivers.values() for one in use.asked]
         self.symbols += [symbol for symbol in joints if symbol not in initial]  # joints without a fact are shut
-        self.symbols += [
-            symbol for symbol in measured if symbol not in self.symbols
-        ]  # measured types without a fact are false
+        # measured types without a fact are false
+        self.symbols += [symbol for symbol in measured if symbol not in self.symbols]
         self.perturb = perturb
         furnish(self, perturb)
         draft = self._draft(initial)

@@ -355,9 +355,8 @@ def execute(
     if execution.episode.refuted and exact:
         from confab.refuting import keep
 
-        met = {
-            found.individual for found, _ in execution.episode.discovered
-        }  # later calls don't know these individuals
+        # later calls don't know these individuals
+        met = {found.individual for found, _ in execution.episode.discovered}
         keep(loaded, [one for one in execution.episode.refuted if met.isdisjoint(one.individuals)])
     if learn and memory is not None:
         with undisturbed(memory):  # other processes may have changed the file during the episode

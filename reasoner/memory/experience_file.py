@@ -250,9 +250,8 @@ def _experience(triples: Iterable[ox.Triple], found: MemoryLines, source: str, n
                 if "false" in node.get("enabled", ()):
                     experience.disabled.add(one.name)
             if "episodes" in node:
-                several = [
-                    _count(text, "episodes") for text in node["episodes"]
-                ]  # a union of two versions has two numbers
+                # a union of two versions has two numbers
+                several = [_count(text, "episodes") for text in node["episodes"]]
                 experience.episodes[node["replica"][0]] = max(several)
             if "chosen" in node:  # knowledge links have only a probability
                 counter, target = (

@@ -63,9 +63,8 @@ class Pddl:
     actions: dict[str, Action] = field(default_factory=dict)
     axioms: list[Axiom] = field(default_factory=list)
     forbidden: list[str] = field(default_factory=list)  # derived predicates that must never hold
-    remembers: dict[str, str] = field(
-        default_factory=dict
-    )  # predicates that stay true after the other predicate was true
+    # predicates that stay true after the other predicate was true
+    remembers: dict[str, str] = field(default_factory=dict)
     sometime: list[Form] = field(default_factory=list)  # further goals
     initial: list[tuple[str, ...]] = field(default_factory=list)
     numbers: dict[tuple[str, ...], Fraction] = field(default_factory=dict)

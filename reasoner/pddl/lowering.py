@@ -190,9 +190,8 @@ class Lowering:
                 holds = both([*guards, self.all_of(rule.conditions, terms, scope)])
                 if holds != NEVER:
                     inside = {term.name for term in head.terms}
-                    left = [
-                        term for term in terms.values() if term.name not in inside
-                    ]  # the atom has no argument for the world
+                    # the atom has no argument for the world
+                    left = [term for term in terms.values() if term.name not in inside]
                     yield head, head.terms, some(left, holds)
 
     # ---------------------------------------------------------------------------------------------------- actions

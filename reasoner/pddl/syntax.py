@@ -386,9 +386,8 @@ class _Reader:
         for one in part.items[1:]:
             self.condition(one, variables)
         condition = part.items[1]
-        if (
-            part.head == "sometime-before"
-        ):  # as in PDDL, the second condition holds in an earlier state than the first one
+        # as in PDDL, the second condition holds in an earlier state than the first one
+        if part.head == "sometime-before":
             first = self.derive("first", typed, _formed(part, "and", part.items[2], _formed(part, "not", condition)))
             allowed = self.remember("allowed", first, typed)
             violated = _formed(part, "and", condition, _formed(part, "not", allowed))

@@ -249,9 +249,8 @@ def allowed_together(behavior: Behavior, situations: Mapping[str, SituationType]
             else:
                 before = Amount(effect.situation, effect.arguments)
                 total: Expression = before
-                for one in (
-                    one for one in behavior.amounts if one in together
-                ):  # in the order in which they are applied
+                # in the order in which they are applied
+                for one in (one for one in behavior.amounts if one in together):
                     total = (
                         Calculation(SIGNS[one.operation], total, one.amount) if one.operation in SIGNS else one.amount
                     )

@@ -156,9 +156,8 @@ def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
     aggregates = [_Doing(one.behavior, {*one.kinds}) for one in known.domain.aggregates.values()]
     doing = [*(_Doing(behavior) for behavior in (*known.lifted.values(), *rules)), *aggregates]
     for total in aggregates:
-        total.follow(
-            known, found, looked_up
-        )  # a total in the slice depends on all of its facts, even if no behaviour is relevant
+        # a total in the slice depends on all of its facts, even if no behaviour is relevant
+        total.follow(known, found, looked_up)
     changed = set[str]()
     before: tuple[int, ...] = ()
     while before != (before := (len(counting), len(changed), len(looked_up), sum(map(len, looked_up.values())))):
@@ -346,11 +345,12 @@ def _steps(condition: Condition, scope: _TypedConjunction, known: Frame) -> Iter
     if len(arguments) != 2:
         properties = frozenset()
     nodes = frozenset(PLACES[1:]) if known.schema.tuples else frozenset()
+    # facts with a default value may be unstated, so these facts can't be used to find arguments
     unstated = (
         situation is not None
         and len(arguments) > len(situation.arguments)
         and (situation.default in _constants(arguments[-1], scope, known))
-    )  # facts with a default value may be unstated, so these facts can't be used to find arguments
+    )
     for at, source in enumerate(arguments):
         kind = scope.kinds.get(source)
         constants = _constants(source, scope, known)

@@ -140,9 +140,8 @@ def link(row: Sequence[Term], blank: bool = False) -> Triple:
         raise KnowledgeError(
             f"<{text(subject)}>: {said} belongs to an ontology, not to an individual; move it beside owl:imports"
         )
-    if (
-        isinstance(subject, ox.BlankNode) and not blank
-    ):  # the message has no ID of the node, which differs in each process
+    # the message has no ID of the node, which differs in each process
+    if isinstance(subject, ox.BlankNode) and not blank:
         raise KnowledgeError(f"a node without a name has a value of {local_name(text(predicate))}; name the individual")
     if not (isinstance(value, ox.NamedNode) or (blank and isinstance(value, ox.BlankNode))):
         what = f"the text '{text(value)[:60]}'" if isinstance(value, ox.Literal) else "a node without a name"

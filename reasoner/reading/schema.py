@@ -20,6 +20,7 @@ from confab.reasoner.vocabulary import CORE, EMBODIMENT
 
 TEXTS = tuple(CORE + name for name in ("update", "extends", "construct"))
 """Properties whose values are texts of updates and queries."""
+# core classes of the schema's nodes
 KINDS = (
     "SituationType",
     "Behavior",
@@ -33,7 +34,7 @@ KINDS = (
     "Calculation",
     "Rule",
     "Window",
-)  # core classes of the schema's nodes
+)
 SCHEMA = f"""
 SELECT DISTINCT ?part ?node ?property ?value WHERE {{
   {{ VALUES ?kind {{ {" ".join(":" + kind for kind in KINDS)} }}

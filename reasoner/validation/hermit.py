@@ -97,10 +97,8 @@ def world_of(triples: bytes) -> Any:
 
     world = owlready2.World()
     kept = b"\n".join(line for line in triples.splitlines() if f"<{IMPORTS}>".encode() not in line)
-    with (
-        contextlib.redirect_stdout(io.StringIO()),
-        contextlib.redirect_stderr(io.StringIO()),
-    ):  # owlready2 prints warnings about punned relations
+    # owlready2 prints warnings about punned relations
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
         world.get_ontology("urn:confab:world").load(fileobj=io.BytesIO(kept + b"\n"))
     return world
 
