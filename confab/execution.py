@@ -1,23 +1,22 @@
-"""Execution of a task in a scene, with interventions in the notation of the command line, and episodes as JSON."""
+"""Execution of a task in a scene (`execute`), and its result (`Execution`)."""
 
 from __future__ import annotations
 
-import math
-import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import TYPE_CHECKING, TypedDict
 
 from confab.accepting import AnyPlan, Facts, check_goal, check_noise, check_seconds, number, plan_of, possible, several
-from confab.formats import EpisodeJson, SeenJson
-from confab.interchange import step_json
+from confab.formats import EpisodeJson
+from confab.interchange import episode_json
+from confab.intervening import parse_interventions
 from confab.planner.acting.episode import End, Episode, Event, Intervention, InterventionKind, situation
 from confab.planner.acting.executive import act
 from confab.planner.acting.failure_memory import Caution
 from confab.planner.acting.retries import RetryPolicy
-from confab.planner.acting.symbolic_world import SymbolicWorld, place_symbols, with_individual
+from confab.planner.acting.symbolic_world import SymbolicWorld, with_individual
 from confab.planner.acting.world import World
 from confab.planner.plan import Plan, Planner, SoftGoal
 from confab.planner.solve import DEFAULT_MODE, Mode
@@ -27,9 +26,9 @@ from confab.reasoner.amounts import written
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import within
 from confab.reasoner.memory.links import Links
-from confab.reasoner.names import RightNames, nearest, right_names
-from confab.reasoner.possible import PLACE, refuse_derived, refuse_impossible, violated
-from confab.reasoner.reading.goals import parse_fact, with_goals
+from confab.reasoner.names import RightNames, right_names
+from confab.reasoner.possible import violated
+from confab.reasoner.reading.goals import with_goals
 from confab.reasoner.symbols import Fact, Problem, Symbol
 
 if TYPE_CHECKING:
@@ -43,269 +42,6 @@ if TYPE_CHECKING:
     from confab.sim.world import PhysicsWorld
 
 WORLDS = ("symbolic", "pybullet")
-
-FORMS = (
-    "'after=28 cup2 LOCATION location8', 'after=28 goal FACT', 'after=28 drop-goal cup2 LOCATION', 'after=28 remove cup2', "
-    "'after=28 add Cup cup9 FACT', 'after=28 knock cup2', 'after=28 push cup2 6 -3' (cm), 'after=28 box location7 [6x6x12]' (cm), "
-    "with after=ID, after=PATH (0.1.2) or at=SECONDS"
-)
-
-
-def parse_interventions(problem: Problem, texts: Iterable[str]) -> list[Intervention]:
-    """Return the interventions that texts describe.
-
-    A text may also name a file with one intervention per line (``#`` begins a comment). An intervention may mention an individual
-    that an intervention before it adds.
-
-    Raises
-    ------
-    KnowledgeError
-        A text has no known form, or mentions terms that the scene doesn't have.
-    """
-    found: list[Intervention] = []
-    for text in texts:
-        lines = [text]
-        if "=" not in text:
-            path = Path(text)
-            if not path.is_file():
-                raise KnowledgeError(f"'{text}' is no intervention and no file; wanted {FORMS}")
-            try:
-                lines = [line.split("#")[0].strip() for line in path.read_text(encoding="utf-8").splitlines()]
-            except UnicodeDecodeError as error:
-                raise KnowledgeError(f"{path}: not UTF-8 text ({error}); wanted one intervention per line") from error
-        for line in filter(None, lines):
-            found.append(parse_intervention(problem, line))
-            if found[-1].change is InterventionKind.ADD:
-                problem = _widened(problem, found[-1])
-    return found
-
-
-def parse_intervention(problem: Problem, text: str) -> Intervention:
-    """Return the intervention that a text describes.
-
-    Raises
-    ------
-    KnowledgeError
-        The text has no known form, or mentions terms that the scene doesn't have.
-    """
-    match = re.fullmatch(r"\s*(after|at)=(\S+)\s+(.+?)\s*", text)
-    if match is None:
-        raise KnowledgeError(f"'{text}' is no intervention; wanted {FORMS}")
-    when: dict[str, Any] = {"text": text.strip()}
-    try:
-        if match[1] == "at":
-            when["at"] = _seconds(match[2])
-        else:
-            # L1#2 names a first-level step; its path is (2,)
-            named = match[2].removeprefix(f"L{problem.domain.levels[0]}#")
-            path = named.split(".") if named == match[2] else [named]
-            when["after"] = int(match[2]) if match[2].isdigit() else tuple(map(_position, path))
-    except ValueError as error:
-        raise KnowledgeError(
-            f"'{match[1]}={match[2]}' in '{text}': wanted an ID, a path like 0.1.2 or a name like L1#2 "
-            "for after, seconds from 0 on for at"
-        ) from error
-    verb, _, rest = match[3].partition(" ")
-    words = rest.split()
-    if verb == "goal":
-        if not words:
-            raise KnowledgeError(f"'{text}': wanted 'goal object SITUATION value'")
-        return Intervention(InterventionKind.GOAL, (Fact(*parse_fact(problem, rest)),), **when)
-    if verb == "drop-goal":
-        return Intervention(InterventionKind.DROP_GOAL, symbol=_symbol(problem, words, text), **when)
-    if verb in ("remove", "knock"):
-        if len(words) != 1:
-            raise KnowledgeError(f"'{text}': wanted '{verb} OBJECT', one object; got {len(words)}")
-        return Intervention(InterventionKind(verb), individual=_placed(problem, words[0], text, verb), **when)
-    if verb == "push":
-        return _push(problem, words, text, when)
-    if verb == "box":
-        return _box(problem, words, text, when)
-    if verb == "add":
-        return _add(problem, words, text, when)
-    fact = Fact(*parse_fact(problem, match[3]))
-    with possible():
-        refuse_derived(problem.domain, [fact], f"'{text}'")
-        refuse_impossible(problem, {}, {fact.symbol: fact.value}, f"'{text}'")
-    return Intervention(InterventionKind.WORLD, (fact,), **when)
-
-
-def _position(text: str) -> int:
-    """Convert a text to a position in a path of steps; raise ValueError if the text isn't a natural number."""
-    if not text.isdigit():
-        raise ValueError(text)
-    return int(text)
-
-
-def _seconds(text: str) -> float:
-    """Convert a text to a time in seconds; raise ValueError if the time is negative or infinite."""
-    seconds = float(text)
-    if not 0 <= seconds < math.inf:
-        raise ValueError(text)
-    return seconds
-
-
-def _symbol(problem: Problem, words: list[str], text: str) -> Symbol:
-    if len(words) < 2:
-        raise KnowledgeError(f"'{text}': wanted 'drop-goal object SITUATION'")
-    symbol = Symbol(words[1], (words[0], *words[2:]))
-    known = {str(s): s for s in (*problem.initial, *problem.goal)}
-    if str(symbol) not in known:
-        raise KnowledgeError(f"'{text}': there is no {symbol}{nearest(str(symbol), known)}")
-    return symbol
-
-
-def _known(problem: Problem, individual: str, text: str) -> str:
-    individuals = {name for symbol in problem.initial for name in symbol.arguments[:1]}
-    if individual not in individuals:
-        raise KnowledgeError(f"'{text}': no object '{individual}'{nearest(individual, individuals)}")
-    return individual
-
-
-def _placed(problem: Problem, individual: str, text: str, verb: str) -> str:
-    """Return the name of an object that is to be knocked over or pushed; raise `KnowledgeError` if no fact states its place."""
-    _known(problem, individual, text)
-    if verb != "remove" and not any(symbol in problem.initial for symbol in place_symbols(problem, individual)):
-        raise KnowledgeError(f"'{text}': {individual} is no object that stands at a place which physics perceives")
-    return individual
-
-
-def _push(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -> Intervention:
-    """Return the push of an object, read from ``OBJECT X Y``: the centimetres away from the robot and to the robot's left."""
-    try:
-        individual, *by = words
-        numbers = tuple(float(number) / 100 for number in by)
-    except ValueError:
-        numbers = ()
-    if len(numbers) != 2 or not all(map(math.isfinite, numbers)) or not any(numbers):
-        raise KnowledgeError(f"'{text}': wanted 'push OBJECT X Y', centimetres away from the robot and to its left")
-    return Intervention(
-        InterventionKind.PUSH, individual=_placed(problem, individual, text, "push"), numbers=numbers, **when
-    )
-
-
-def _box(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -> Intervention:
-    """Return the intervention that puts a box at a place, read from ``PLACE [WIDTHxDEPTHxHEIGHT]`` in centimetres."""
-    place, size = (*words, "6x6x12")[:2] if words else ("", "")
-    try:
-        numbers = tuple(float(number) / 100 for number in size.split("x"))
-    except ValueError:
-        numbers = ()
-    if len(words) not in (1, 2) or len(numbers) != 3 or not all(0.01 <= number <= 1 for number in numbers):
-        raise KnowledgeError(f"'{text}': wanted 'box PLACE', or 'box PLACE 6x6x12' with centimetres from 1 to 100")
-    situations = [s for s in problem.domain.situations.values() if s.perceived is not None and s.perceived.by == PLACE]
-    wheres = [s for s in situations if len(s.arguments) == 1 and place in problem.members(s.range)]
-    if not wheres:
-        known = [one for s in situations for one in problem.members(s.range)]
-        raise KnowledgeError(f"'{text}': no place '{place}' at which physics perceives objects{nearest(place, known)}")
-    name, number = "box1", 1
-    while name in problem.individuals:
-        number += 1
-        name = f"box{number}"
-    fact = Fact(Symbol(wheres[0].name, (name,)), place)
-    return Intervention(
-        InterventionKind.BOX, (fact,), individual=name, kind=wheres[0].arguments[0], numbers=numbers, **when
-    )
-
-
-def _widened(problem: Problem, added: Intervention) -> Problem:
-    """Return the problem with the individual that an intervention adds, and with the facts of this individual."""
-    initial = {**problem.initial, **{fact.symbol: fact.value for fact in added.facts}}
-    return replace(with_individual(problem, added.individual, added.kind), initial=initial)
-
-
-def _add(problem: Problem, words: list[str], text: str, when: dict[str, Any]) -> Intervention:
-    """Return the intervention that adds an individual with facts, read from words like ``Cup cup9 LOCATION location5``."""
-    if len(words) < 4 or len(words) % 2:
-        raise KnowledgeError(f"'{text}': wanted 'add CLASS NAME SITUATION value …'")
-    kind, individual, *pairs = words
-    if kind not in problem.classes:
-        raise KnowledgeError(f"'{text}': unknown class '{kind}'{nearest(kind, problem.classes)}")
-    if any(individual in members for members in problem.classes.values()):
-        raise KnowledgeError(f"'{text}': there is a '{individual}' already; take another name")
-    wider = with_individual(problem, individual, kind)
-    facts = [
-        Fact(*parse_fact(wider, f"{individual} {situation} {value}"))
-        for situation, value in zip(pairs[::2], pairs[1::2], strict=True)
-    ]
-    with possible():
-        refuse_impossible(wider, {}, {fact.symbol: fact.value for fact in facts}, f"'{text}'")
-    return Intervention(InterventionKind.ADD, tuple(facts), individual=individual, kind=kind, **when)
-
-
-def episode_json(episode: Episode) -> EpisodeJson:
-    """Return an episode as JSON data (docs/execution.md)."""
-    return {
-        "scene": episode.scene,
-        "status": episode.status.value,
-        "reasons": [{"text": reason.text, "terms": list(reason.terms)} for reason in episode.reasons],
-        "length": {str(level): count for level, count in episode.done.length.items()},
-        "planned": [step_json(step) for step in episode.planned.steps],
-        "steps": [step_json(step) for step in episode.done.steps],
-        "events": [
-            {
-                "path": list(event.step.path),
-                "id": event.step.id,
-                "behavior": event.step.behavior,
-                "arguments": list(event.step.arguments),
-                "begin": round(event.begin, 4),
-                "end": round(event.end, 4),
-                "ok": event.ok,
-                "code": event.code,
-                "surprises": [
-                    {"symbol": str(s.symbol), "expected": s.expected, "observed": s.observed} for s in event.surprises
-                ],
-            }
-            for event in episode.events
-        ],
-        "interventions": [{"text": i.text, "seconds": round(at, 4)} for i, at in episode.interventions],
-        "never_came": [i.text for i in episode.missed],
-        "replans": [
-            {
-                "after": list(replan.after),
-                "kind": replan.kind,
-                "because": replan.because,
-                "cost": replan.cost,
-                "dropped": replan.dropped,
-                "added": replan.added,
-                "seconds": round(replan.seconds, 6),
-                "steps": [step_json(step) for step in replan.steps],
-            }
-            for replan in episode.replans
-        ],
-        "failures": [
-            {
-                "path": list(failure.step.path),
-                "id": failure.step.id,
-                "code": failure.code,
-                "objects": list(failure.objects),
-                "message": failure.message,
-            }
-            for failure in episode.failures
-        ],
-        "discovered": [
-            {"individual": found.individual, "classes": list(found.kinds), "text": found.text, "seconds": round(at, 4)}
-            for found, at in episode.discovered
-        ],
-        "goal": [str(Fact(symbol, value)) for symbol, value in sorted(episode.goal.items())],
-        "initial": [_situated(symbol, value, 0.0) for symbol, value in sorted(episode.initial.items())],
-        "course": [_situated(seen.symbol, seen.value, seen.seconds) for seen in episode.course],
-        "seconds": {name: round(value, 6) for name, value in episode.seconds.items()},
-        "measured": episode.measured,
-    }
-
-
-def _situated(symbol: Symbol, value: str | None, seconds: float) -> SeenJson:
-    """Return the value of a symbol, and the time at which the symbol got this value, as JSON data."""
-    return {
-        "seconds": round(seconds, 4),
-        "situation": symbol.situation,
-        "arguments": list(symbol.arguments),
-        "value": value,
-    }
-
-
-# -------------------------------------------------------------------------------------------------------------- public functions
 
 
 @right_names("an execution", "scene.execute() or scene.read_episode(FILE)")

@@ -1,4 +1,4 @@
-"""Conversion of plans to and from JSON, the format that the command line writes and reads (docs/command-line.md)."""
+"""Plans and episodes as JSON, which the command line writes and reads (docs/command-line.md, docs/execution.md)."""
 
 from __future__ import annotations
 
@@ -6,14 +6,17 @@ import json
 from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
-from confab.formats import OutcomeJson, StepJson
+from confab.formats import EpisodeJson, OutcomeJson, SeenJson, StepJson
 from confab.planner.certificates import Certificate, certificate_from, certificate_json
 from confab.planner.plan import Outcome, Plan, Status, Step
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.names import nearest
-from confab.reasoner.symbols import Behavior, Problem
+from confab.reasoner.symbols import Behavior, Fact, Problem, Symbol
+
+if TYPE_CHECKING:
+    from confab.planner.acting.episode import Episode
 
 DEEPEST = 50
 """Maximum depth of nested steps in a plan."""
@@ -70,6 +73,78 @@ def outcome_json(scene: str, outcome: Outcome, seconds: Mapping[str, float]) -> 
     if outcome.certificate is not None:
         data["certificate"] = certificate_json(outcome.certificate)
     return data
+
+
+def episode_json(episode: Episode) -> EpisodeJson:
+    """Return an episode as JSON data (docs/execution.md)."""
+    return {
+        "scene": episode.scene,
+        "status": episode.status.value,
+        "reasons": [{"text": reason.text, "terms": list(reason.terms)} for reason in episode.reasons],
+        "length": {str(level): count for level, count in episode.done.length.items()},
+        "planned": [step_json(step) for step in episode.planned.steps],
+        "steps": [step_json(step) for step in episode.done.steps],
+        "events": [
+            {
+                "path": list(event.step.path),
+                "id": event.step.id,
+                "behavior": event.step.behavior,
+                "arguments": list(event.step.arguments),
+                "begin": round(event.begin, 4),
+                "end": round(event.end, 4),
+                "ok": event.ok,
+                "code": event.code,
+                "surprises": [
+                    {"symbol": str(s.symbol), "expected": s.expected, "observed": s.observed} for s in event.surprises
+                ],
+            }
+            for event in episode.events
+        ],
+        "interventions": [{"text": i.text, "seconds": round(at, 4)} for i, at in episode.interventions],
+        "never_came": [i.text for i in episode.missed],
+        "replans": [
+            {
+                "after": list(replan.after),
+                "kind": replan.kind,
+                "because": replan.because,
+                "cost": replan.cost,
+                "dropped": replan.dropped,
+                "added": replan.added,
+                "seconds": round(replan.seconds, 6),
+                "steps": [step_json(step) for step in replan.steps],
+            }
+            for replan in episode.replans
+        ],
+        "failures": [
+            {
+                "path": list(failure.step.path),
+                "id": failure.step.id,
+                "code": failure.code,
+                "objects": list(failure.objects),
+                "message": failure.message,
+            }
+            for failure in episode.failures
+        ],
+        "discovered": [
+            {"individual": found.individual, "classes": list(found.kinds), "text": found.text, "seconds": round(at, 4)}
+            for found, at in episode.discovered
+        ],
+        "goal": [str(Fact(symbol, value)) for symbol, value in sorted(episode.goal.items())],
+        "initial": [_situated(symbol, value, 0.0) for symbol, value in sorted(episode.initial.items())],
+        "course": [_situated(seen.symbol, seen.value, seen.seconds) for seen in episode.course],
+        "seconds": {name: round(value, 6) for name, value in episode.seconds.items()},
+        "measured": episode.measured,
+    }
+
+
+def _situated(symbol: Symbol, value: str | None, seconds: float) -> SeenJson:
+    """Return the value of a symbol, and the time at which the symbol got this value, as JSON data."""
+    return {
+        "seconds": round(seconds, 4),
+        "situation": symbol.situation,
+        "arguments": list(symbol.arguments),
+        "value": value,
+    }
 
 
 def read_plan(path: Path, problem: Problem) -> Plan:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from confab.interchange import step_from
+from confab.intervening import parse_intervention
 from confab.known import Known
 from confab.planner.acting.discovery import Discovery
 from confab.planner.acting.episode import (
@@ -174,8 +175,6 @@ def _interventions(
 
     The extended problem has the individuals that were discovered or added during the execution.
     """
-    from confab.execution import parse_intervention
-
     for one in data.get("discovered", []):
         for kind in one["classes"]:
             problem = with_individual(problem, one["individual"], kind)

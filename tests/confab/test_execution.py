@@ -12,7 +12,9 @@ from rich.console import Console
 
 import confab
 from confab import ontology
-from confab.execution import episode_json, execute, parse_interventions
+from confab.execution import execute
+from confab.interchange import episode_json
+from confab.intervening import parse_interventions
 from confab.live import View, in_terminal
 from confab.planner.acting.episode import End, Event, Intervention, InterventionKind
 from confab.planner.acting.symbolic_world import SymbolicWorld
