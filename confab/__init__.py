@@ -1,14 +1,20 @@
 """Confab: a robot planner whose knowledge lives in an ontology.
 
-================  =========================================================================================
-`scenes()`        the shipped scenes' names `load(name)`      a `Scene`: a shipped name, a file of your own, or the URL of a
-SPARQL endpoint `scene.query(…)`  query the scene in SPARQL: a `Table` `scene.plan(…)`   plan in the scene: a `Result`
-`scene.verify(…)` execute a plan in physics: a `Report` `scene.execute(…)`  execute the task in a closed loop, with interventions:
-an `Execution` `Memory`          experience from planning and execution `practise(…)`     learn in scenes, and measure the benefit
-`new_domain(name)`  write a skeleton of a new domain `validate(file)`  list the faults of an ontology file, with remedies
-`generate(…)`     a generated scene of any size `within(seconds)` a time limit for all calls in a block `KnowledgeError`  the
-given input can't be used; the message states the fault, its position, and the remedy
-================  =========================================================================================
+===================  ==========================================================================================
+`scenes()`           the shipped scenes' names
+`load(name)`         a `Scene`: a shipped name, a file of your own, or the URL of a SPARQL endpoint
+`scene.query(…)`     query the scene in SPARQL: a `Table`
+`scene.plan(…)`      plan in the scene: a `Result`
+`scene.verify(…)`    execute a plan in physics: a `Report`
+`scene.execute(…)`   execute the task in a closed loop, with interventions: an `Execution`
+`Memory`             experience from planning and execution
+`practise(…)`        learn in scenes, and measure the benefit
+`new_domain(name)`   write a skeleton of a new domain
+`validate(file)`     list the faults of an ontology file, with remedies
+`generate(…)`        a generated scene of any size
+`within(seconds)`    a time limit for all calls in a block
+`KnowledgeError`     the given input can't be used; the message states the fault, its position, and the remedy
+===================  ==========================================================================================
 
 >>> import confab
 >>> scene = confab.load("beverage-serving")

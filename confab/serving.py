@@ -1,9 +1,9 @@
 """A scene as a page and a read-only SPARQL 1.1 endpoint on loopback (docs/serving.md, docs/page.md).
 
 ==============  ==========================================================================================================
-``/sparql``     the SPARQL 1.1 protocol (GET, POST of a form, POST of a query); without a query, the service description ``/``
-the page (`confab.page`) ``/page.json``  the content of the page about the scene or a running execution (GET), and after changes
-of controls (POST)
+``/sparql``     the SPARQL 1.1 protocol (GET, POST of a form, POST of a query); without a query, the service description
+``/``           the page (`confab.page`)
+``/page.json``  the content of the page about the scene or a running execution (GET), and after changes of controls (POST)
 ==============  ==========================================================================================================
 
 A GET of ``/page.json?after=VERSION`` is answered with status 204 if no newer version exists.

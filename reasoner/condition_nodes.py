@@ -3,17 +3,21 @@
 A node is an individual of a core class, for example ``:ValueCondition``. The table lists the properties of each class; a negated
 condition also has ``:negated true``.
 
-========================  =====================================================================
+========================  ==================================================================================
 class                     properties
-========================  =====================================================================
-`:ValueCondition`         ``:situationType``, arguments, ``:value`` `:RelationCondition`      ``:relation``, arguments; the last
-of several arguments is the ``:value`` `:ClassCondition`         ``:about``, ``:ofClass`` `:EqualityCondition`      ``:about``,
-``:value`` `:Witness`                ``:witness`` (the variable), ``:condition`` for each condition `:AnyOf`
-``:alternative`` for each condition or `:AllOf` `:AllOf`                  ``:condition`` for each condition `:Comparison`
-``:sign``; left side: an amount or ``:left``; right side: ``:amount`` or ``:right`` `:Calculation`            those of a
-comparison, or only an amount, or only ``:amount`` `:ValueEffect`            those of a value condition, ``:when`` for each
-condition `:AmountEffect`           an amount, ``:change``, ``:amount`` or ``:right``, ``:when`` for each condition
-========================  =====================================================================
+========================  ==================================================================================
+`:ValueCondition`         ``:situationType``, arguments, ``:value``
+`:RelationCondition`      ``:relation``, arguments; the last of several arguments is the ``:value``
+`:ClassCondition`         ``:about``, ``:ofClass``
+`:EqualityCondition`      ``:about``, ``:value``
+`:Witness`                ``:witness`` (the variable), ``:condition`` for each condition
+`:AnyOf`                  ``:alternative`` for each condition or `:AllOf`
+`:AllOf`                  ``:condition`` for each condition
+`:Comparison`             ``:sign``; left side: an amount or ``:left``; right side: ``:amount`` or ``:right``
+`:Calculation`            those of a comparison, or only an amount, or only ``:amount``
+`:ValueEffect`            those of a value condition, ``:when`` for each condition
+`:AmountEffect`           an amount, ``:change``, ``:amount`` or ``:right``, ``:when`` for each condition
+========================  ==================================================================================
 
 An `:AnyOf` that enforces a constraint also has ``:enforces`` (`ENFORCED`), with the constrained situation types as arguments.
 

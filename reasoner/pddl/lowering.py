@@ -3,9 +3,9 @@
 ==============================  ==================================================================
 in the scene                    in PDDL
 ==============================  ==================================================================
-effect on a value                the old value is deleted; an unknown one becomes a parameter negated value, inequality
-parameter for the actual value, which must be different "no individual has the value"   extra predicate of the value, or of each
-individual and the
+effect on a value               the old value is deleted; an unknown one becomes a parameter
+negated value, inequality       parameter for the actual value, which must be different
+"no individual has the value"   extra predicate of the value, or of each individual and the
                                 value (`confab.reasoner.pddl.absence`)
 symbol that may not exist       static predicate of the arguments for which it exists
 defined situation               its definition; ``:derived`` if it is recursive

@@ -3,8 +3,9 @@
 ============================  ==========================================================================
 in the ontology               in `confab.reasoner.symbols`
 ============================  ==========================================================================
-``M :remembers S``            ``Domain.remembers``: M is true in the first state in which S is true, and in all later states ``S
-:atMostOnce true``        ``S.again`` is never true: S is true, and ``S.ended`` remembers that S,
+``M :remembers S``            ``Domain.remembers``: M is true in the first state in which S is true, and
+                              in all later states
+``S :atMostOnce true``        ``S.again`` is never true: S is true, and ``S.ended`` remembers that S,
                               which ``S.begun`` remembers, was false later
 ``S :onlyAfter E``            ``S.before.E`` is never true: S is true, and ``S.after.E`` doesn't remember
                               that E was true while S was false
