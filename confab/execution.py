@@ -138,11 +138,8 @@ class Execution(metaclass=RightNames):
         text += "".join(f"; seen: {found.text}" for found, _ in episode.discovered if found.text)
         text += "".join(f"; {violation}" for violation in self.violations)
         text += "".join(f"; {reason.text}" for reason in episode.reasons)
-        return text + (
-            f"; the step or time of an intervention wasn't reached: {', '.join(i.text for i in episode.missed)}"
-            if episode.missed
-            else ""
-        )
+        missed = ", ".join(intervention.text for intervention in episode.missed)
+        return text + (f"; the step or time of an intervention wasn't reached: {missed}" if episode.missed else "")
 
     def graph(self) -> networkx.DiGraph[int]:
         """Return the partial order of the executed primitives. An edge leads from a primitive to a primitive that depends on it."""

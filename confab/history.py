@@ -196,10 +196,6 @@ def history_html(those: Sequence[Run], title: str, names: Sequence[str] = ()) ->
 
 
 def _text(value: object) -> str:
-    return (
-        ", ".join(map(_text, value))
-        if isinstance(value, list)
-        else f"{value:g}"
-        if isinstance(value, float)
-        else str(value)
-    )
+    if isinstance(value, list):
+        return ", ".join(map(_text, value))
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -141,13 +141,9 @@ class WhyNot:
     __repr__ = __rich__ = __str__
 
     def _repr_html_(self) -> str:
-        return styled(
-            tag("p", self.answer),
-            tag("ul", [tag("li", line) for line in (*self.lacks, *self.breaks)], class_="bad")
-            if self.lacks or self.breaks
-            else None,
-            tag("ol", [tag("li", line) for line in self.steps]) if self.steps else None,
-        )
+        bad, steps = ([tag("li", line) for line in lines] for lines in ((*self.lacks, *self.breaks), self.steps))
+        below = (tag("ul", bad, class_="bad") if bad else None, tag("ol", steps) if steps else None)
+        return styled(tag("p", self.answer), *below)
 
 
 @known_as("an explanation")

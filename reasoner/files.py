@@ -87,11 +87,8 @@ def written_whole(path: Path, suffix: str = "") -> Iterator[Path]:
                 os.chown(part, old.st_uid, old.st_gid)
         part.replace(target)
     except OSError as error:
-        said = (
-            (error.strerror or str(error))
-            if error.filename in (None, str(path))
-            else f"can't be written: {error.strerror}"
-        )
+        own = error.filename in (None, str(path))
+        said = (error.strerror or str(error)) if own else f"can't be written: {error.strerror}"
         raise OSError(error.errno, said, str(path)) from error
     finally:
         with suppress(OSError):

@@ -344,11 +344,8 @@ class Attempt:
         turned = float(np.arccos(np.clip((np.trace(first_rotation.T @ rotation) - 1) / 2, -1, 1)))
         lost, most = self.world.held(self.hand.hand.name) != self.held, numbers["slip"]
         if lost or slip > most:
-            how = (
-                "is pressed by no two fingers"
-                if lost
-                else f"slipped by {slip * 1000:.0f} mm, wanted at most {most * 1000:.0f}"
-            )
+            slipped = f"slipped by {slip * 1000:.0f} mm, wanted at most {most * 1000:.0f}"
+            how = "is pressed by no two fingers" if lost else slipped
             raise SkillError("slip or drop", (self.held,), f"{self.held} {how}", slip_m=slip, turned_rad=turned)
         return {"slip_m": slip, "turned_rad": turned}
 

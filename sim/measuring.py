@@ -116,13 +116,8 @@ def check(run: SkillRun, phase: Phase, guard: Guard) -> None:
         run.measured[quantity.name] = value
     if not holds:
         load = _load(run)
-        things = (
-            run.things()
-            if guard.quantity in ("off", "height", "joint", "push", "astray")
-            else (load,)
-            if load
-            else run.things()
-        )
+        of_others = guard.quantity in ("off", "height", "joint", "push", "astray")
+        things = (load,) if load and not of_others else run.things()
         wanted = f"{'at least' if guard.sign > 0 else 'at most'} {bound:.3g}"
         message = f"{guard.quantity} {value:.3g} after {phase.name}, wanted {wanted}"
         raise SkillError(guard.code or quantity.code, things, message, **run.measured)

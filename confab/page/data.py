@@ -79,16 +79,12 @@ def page_data(
     ended = execution if execution is not None else result
     soft = () if ended is None else ended.soft_goals
     good, status = status_of(outcome, report, execution)
+    shown = report if execution is None else execution
+    planning = "" if outcome is None else summary(outcome).splitlines()[0]
     data |= {
         "good": good,
         "status": status,
-        "headline": execution.summary()
-        if execution is not None
-        else report.summary()
-        if report is not None
-        else summary(outcome).splitlines()[0]
-        if outcome is not None
-        else "",
+        "headline": planning if shown is None else shown.summary(),
         "tiles": tiles_of(problem, timeline if planned else None, outcome, report, execution, soft),
         "goals": goals_of(timeline, labels, planned),
         "notes": [

@@ -84,11 +84,8 @@ def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
         raise KnowledgeError(f"unknown individual '{about}' in '{fact}'{nearest(about, individuals, hint)}")
     if name not in known:
         meant = next((each for each, situation in known.items() if name in situation.properties), "")
-        hint = (
-            f"; it is the value property of {meant}"
-            if meant
-            else nearest(name, authored) or _with_situation(problem, words)
-        )
+        near = nearest(name, authored) or _with_situation(problem, words)
+        hint = f"; it is the value property of {meant}" if meant else near
         raise KnowledgeError(f"unknown situation type '{name}' in '{fact}'{hint} (known: {', '.join(authored)})")
     situation = known[name]
     if situation.boolean and len(rest) == len(situation.arguments) - 1:

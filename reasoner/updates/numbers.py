@@ -68,11 +68,9 @@ class Numbers:
         name = getattr(one, "name", "")
         if name == "UnaryMinus":
             found = self.expression(one.expr, known, at)
-            return (
-                NumberLiteral(-found.value)
-                if isinstance(found, NumberLiteral)
-                else Sum("-", NumberLiteral(Fraction(0)), found)
-            )
+            if isinstance(found, NumberLiteral):
+                return NumberLiteral(-found.value)
+            return Sum("-", NumberLiteral(Fraction(0)), found)
         if name in ARITHMETIC:
             found = self.expression(one.expr, known, at)
             for sign, other in zip(one.op, one.other, strict=True):

@@ -32,12 +32,8 @@ class TextPosition:
 
     def __str__(self) -> str:
         """Return the position as a phrase for messages."""
-        of = (
-            f"the update of {local_name(self.behavior)}"
-            if self.form == "update"
-            else f"the rule {local_name(self.behavior)}"
-        )
-        return f"line {self.line}, column {self.column} of {of}"
+        of = "the update of" if self.form == "update" else "the rule"
+        return f"line {self.line}, column {self.column} of {of} {local_name(self.behavior)}"
 
 
 @dataclass(frozen=True)

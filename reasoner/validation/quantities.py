@@ -288,15 +288,15 @@ class _Ranges:
         said = []
         for situation in sorted(found):
             low, high = self.known.get(situation, ANY)
-            said.append(
-                f"{situation} is always {_written(low)}"
-                if low == high
-                else f"{situation} is never less than {_written(low)}"
-                if high == inf
-                else f"{situation} is never more than {_written(high)}"
-                if low == -inf
-                else f"{situation} is always from {_written(low)} to {_written(high)}"
-            )
+            if low == high:
+                within = f"always {_written(low)}"
+            elif high == inf:
+                within = f"never less than {_written(low)}"
+            elif low == -inf:
+                within = f"never more than {_written(high)}"
+            else:
+                within = f"always from {_written(low)} to {_written(high)}"
+            said.append(f"{situation} is {within}")
         return " and ".join(said) or "no state satisfies this"
 
     def after(self, effect: AmountEffect, narrowed: Mapping[Expression, Range]) -> Range | None:
