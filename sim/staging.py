@@ -150,15 +150,7 @@ def _vary(engine: Engine, shape: Shape, place: str, perturb: Perturbation | None
         position[:2] += engine.rng.uniform(-limit, limit, 2)
         yaw = float(engine.rng.uniform(-perturb.yaw, perturb.yaw))
         friction, mass = engine.rng.uniform(*perturb.friction), engine.rng.uniform(*perturb.mass)
-        shape = Shape(
-            shape.kind,
-            shape.mass * mass,
-            shape.grasp_height,
-            shape.profile,
-            shape.numbers,
-            shape.color,
-            shape.friction * friction,
-        )
+        shape = replace(shape, mass=shape.mass * mass, friction=shape.friction * friction)
     return shape, position, yaw
 
 

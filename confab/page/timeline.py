@@ -7,7 +7,7 @@ world's clock.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from confab.planner.acting.schedule import worker_of, workers_of
@@ -216,16 +216,7 @@ def of_episode(problem: Problem, episode: Episode) -> Timeline:
     marks = [(at, intervention.text) for intervention, at in episode.interventions]
     ends = {event.step.path: event.end for event in episode.events}
     marks += [(ends.get(r.after, 0.0), f"{r.kind}: {r.because}") for r in episode.replans]
-    lived = Problem(
-        problem.scene,
-        problem.domain,
-        problem.classes,
-        problem.relations,
-        episode.initial,
-        episode.goal,
-        problem.parents,
-        problem.value_levels,
-    )
+    lived = replace(problem, initial=episode.initial, goal=episode.goal, times=None, weights={})
     found = {symbol: tuple(those) for symbol, those in phases.items()}
     unit = "steps" if all(bar.end - bar.begin == 1.0 for bar in bars) else "s"
     return Timeline(lived, episode.done, bars, found, end, unit, episode.observed, tuple(sorted(marks)))
