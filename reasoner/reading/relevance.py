@@ -176,9 +176,8 @@ def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
 
 def _span_to_totals(aggregate: Aggregate, changed: set[str], known: Frame, found: Routes, looked_up: LookedUp) -> None:
     """Add the routes from changing facts to the individuals whose derived amounts depend on these facts."""
-    kinds = {term.name: term.kind for term in (*aggregate.parameters, *aggregate.variables)}
     named, left = {parameter.name for parameter in aggregate.parameters}, read_by(aggregate) & changed
-    for scope in _scopes(aggregate.conditions, kinds):
+    for scope in _scopes(aggregate.conditions, aggregate.kinds):
         for condition in scope.conditions:
             if isinstance(condition, ValueCondition) and condition.situation in changed:
                 _span(scope, {*condition.arguments, condition.value}, named, known, found, looked_up)
@@ -213,7 +212,9 @@ class _Doing:
         self.effects = []
         for effect in behavior.every_effect:
             kinds = {**behavior.kinds, **({effect.each.name: effect.each.kind} if effect.each else {})}
-            self.effects.append((effect, _scopes((*behavior.preconditions, *effect.when), kinds), _terms_in(effect)))
+            scopes = _scopes((*behavior.preconditions, *effect.when), kinds)
+            given = (effect.value,) if isinstance(effect, ValueEffect) else terms_of(effect.amount)
+            self.effects.append((effect, scopes, {*effect.arguments, *given}))
         amounts = [situations_in(effect.amount) for effect in behavior.amounts]
         scopes = [*self.asks, *(scope for _, scopes, _ in self.effects for scope in scopes)]
         asked = (s for scope in scopes for condition in scope.conditions for s in situations_of(condition))
@@ -234,12 +235,6 @@ class _Doing:
                 if (number, start) not in self.spanned:
                     self.spanned.add((number, start))
                     _span(first, set(start), self.step | named, known, found, looked_up)
-
-
-def _terms_in(effect: Effect) -> set[str]:
-    """Return the terms in the arguments and in the value of an effect."""
-    given = (effect.value,) if isinstance(effect, ValueEffect) else terms_of(effect.amount)
-    return {*effect.arguments, *given}
 
 
 def _given(effect: Effect, looked_up: LookedUp) -> Iterator[frozenset[str]]:
