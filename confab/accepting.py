@@ -58,7 +58,8 @@ class Stated(list[str]):
         values = self._values()
         if index not in values:
             about = [symbol for symbol in values if index in symbol.split()]
-            raise KeyError(f"no fact about '{index}'{nearest(index, about or values, ', '.join(about))}")
+            known = f"wanted an object and its situation type: {', '.join(about or [*values][:3])}"
+            raise KeyError(f"no fact at '{index}'{nearest(index, about or values, known)}")
         return values[index]
 
     def _values(self) -> dict[str, str]:

@@ -102,6 +102,8 @@ class Execution(metaclass=RightNames):
         data = episode_json(self.episode)
         if soft := self.soft_goals:
             data["soft_goals"] = [{"goal": str(one.fact), "weight": float(one.weight), "met": one.met} for one in soft]
+        if violations := self.violations:
+            data["violations"] = [*violations]
         return data
 
     def notes(self) -> dict[tuple[int, ...], str]:

@@ -202,7 +202,10 @@ class SoftGoalJson(TypedDict):
 
 
 class EpisodeJson(TypedDict):
-    """The record of the execution of a task; `soft_goals` is present if the task has soft goals."""
+    """The record of the execution of a task.
+
+    `soft_goals` is present if the task has soft goals, `violations` if violations of constraints were observed.
+    """
 
     scene: str
     status: str
@@ -222,6 +225,7 @@ class EpisodeJson(TypedDict):
     seconds: dict[str, float]
     measured: bool
     soft_goals: NotRequired[list[SoftGoalJson]]
+    violations: NotRequired[list[str]]
 
 
 class BecauseJson(TypedDict):

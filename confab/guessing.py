@@ -1,16 +1,26 @@
 """Suggestions of the right name for a wrong name.
 
-Each kind of object has a table of wrong names (`confab.hints`). First the whole wrong name is looked up in the table, then the
-words of the name. Words that aren't in the table are compared with the public names and their descriptions. Words with the same
-meaning count as equal. The candidates are first the names of the object itself, then the names of objects in its attributes
-(``result.outcome.search``), then all other names (``scene.with_fact``).
+Each kind of object has a table of wrong names (`confab.hints`). A wrong name is looked up in this order:
+
+1. as a whole, or with the same words in another order, in the table of its object;
+2. among the names of the objects of other libraries that the object is converted to (``scene.graph``, ``plan.to_dataframe()``);
+3. as a whole in the tables of the objects that are reachable from its object (``result.plan``)
+   or, for a name of several words, in the tables of all other objects;
+4. by its words in the table of its object;
+5. as a whole in the tables of all other objects;
+6. by words with the same meaning in the table of its object;
+7. by its words in the public names and their descriptions. Words with the same meaning count as equal. The candidates are first
+   the names of the object itself, then the names of objects in its attributes (``result.outcome.search``), then all other names
+   (``scene.with_fact``).
+
+If only a part of the words is known, up to three names are suggested.
 """
 
 from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from difflib import SequenceMatcher, get_close_matches
 from functools import cache
@@ -60,24 +70,41 @@ WAYS: Mapping[str, Mapping[str, str]] = {
     "fact": {"symbol": "symbol"},
 }
 """The attribute or the call that leads from an object to another object, indexed by the kinds of the two objects."""
+FORMS: Mapping[str, Mapping[str, str]] = {
+    "scene": {
+        "graph": "rdflib.Graph",
+        "owl": "owlready2.World",
+        "to_unified_planning()": "unified_planning.model.Problem",
+    },
+    "plan": {"to_dataframe()": "pandas.DataFrame", "to_networkx()": "networkx.DiGraph"},
+    "execution": {"graph()": "networkx.DiGraph"},
+    "table": {"dataframe()": "pandas.DataFrame"},
+    "memory": {"table().dataframe()": "pandas.DataFrame"},
+}
+"""The attributes and calls that return an object of another library, each with the object's class."""
 MEANINGS = """
-load open read parse import file ontology problem domain scene ttl turtle owl rdf make world env gym
+load open read parse import consult initialize initialise start setup attach mount file ontology problem domain scene ttl turtle
+load open owl rdf make world env gym
 scenes examples datasets catalog list available builtin samples
 families family generate random synthetic table benchmark
-plan solve policy planner planning replan find compute start predict motion
-query ask sparql select
+plan solve policy planner seek decompose think reason pyhop htn planning replan find compute start predict motion
+query ask sparql select match cypher findall lookup retrieve question datalog search filter where
 verify simulate simulation simulator physics physically rollout roll dry monte carlo test
-execute run act perform dispatch apply step through carry drive real move play tick loop
+execute run act perform dispatch apply step through carry drive real move play tick loop lookahead operate command walk resume
+execute run proceed
 validate lint check shacl consistent consistency errors error warnings warning problems
-facts fact state initial init values now current belief situation world
-goals goal task tasks objective desired target wanted
-objects object individuals individual instances things entities
-behaviors behavior behaviours behaviour action actions operator operators skills schema schemas preconditions effects name
+facts fact state initial init values now current belief beliefs knows know true situation world whereabouts where at location
+facts fact status snapshot
+goals goal task tasks objective desired target wanted todo mission aim purpose order request intention intent desire
+objects object individuals individual instances things entities inventory stuff nodes resources contents bodies
+behaviors behavior abilities ability capability capabilities methods method procedures commands tasks behaviours behaviour
+behaviors behavior action actions operator operators skills schema schemas preconditions effects name
 situations predicates fluents situation variables
 arguments args params parameters operands objects
-steps actions children kids subplan subplans sub substeps refinement decomposition sequence list trajectory
-primitives primitive leaves low atomic flatten flat
-cost metric price total objective reward
+steps actions children kids decompose expand nested below inner subtasks parts components subplan subplans sub substeps
+steps actions refinement decomposition sequence list trajectory
+primitives primitive leaves low atomic flatten flat commands motions moves
+cost metric price total objective reward expense effort fitness
 rollouts runs trials episodes repeats repetitions attempts iterations
 world simulator simulation backend env environment
 interventions disturbances perturbations noise interrupts surprises
@@ -85,15 +112,15 @@ forgone soft preferences preference unmet unachieved violated open
 within timeout deadline limit time budget
 relations static constants
 classes types sorts kinds hierarchy taxonomy
-index find search locate position
+index find search locate position goto jump nth at get
 engine solver planner backend
 source path file filename uri url
 output out file save destination
 ground grounded grounding instantiate quantifying applicable
 seconds time timeout deadline limit runtime duration elapsed wall cpu clock
-search expanded expansions statistics stats nodes generated
-reason why because unsolvable failure failed error explain justify
-report html page visualise visualize visualization render plot browser gantt chart
+search expanded expansions statistics stats nodes generated visited explored effort iterations evaluated
+reason why because unsolvable failure failed error explain justify cause rationale motive background
+report html page browser tab visualise visualize visualization render plot browser gantt chart
 picture draw show plot render image png map visualise visualize screenshot svg diagram thumbnail figure
 video film movie gif mp4 animation
 graph triples rdf rdflib turtle ttl n3 jsonld serialize serialise save add
@@ -106,32 +133,33 @@ records dict dicts
 rows head values tail
 length levels num number count size depth shape
 level depth layer height
-solved success succeeded ok solvable done found feasible
+solved success succeeded ok solvable done found feasible well went good worked works fine valid won
 outcome status termination
 bound optimal lower gap
 timed schedule makespan duration timeline gantt
 certificate proof
-events timeline observations history log trace
+events timeline observations history log trace journal record transcript diary messages
 replans repairs changes replanning
 failures failure errors faults
 faults valid invalid violations correct
-memory experience learn learned train fit forget knowledge
-advice rules rule weights
+memory experience learn learned train fit forget knowledge practice lessons
+advice rules rule weights recall knowledge knows remembered learned lessons beliefs patterns insights
 embodiment robot robots arms body urdf hardware gripper kinematics joints links
 iri uri namespace namespaces prefixes base
 names prefixes prefix namespaces namespace manager
-with_fact fact set assert tell put remove without change update insert assume modify transform clone copy
+with_fact fact set assert tell put remove without change update insert assume modify transform clone copy believe suppose
+with_fact fact imagine pretend edit move
 with_goal goal set replace
 rate accuracy probability score
 label words text sentence name title
 id index identifier uuid
-affordances possible applicable available afford legal can do
+affordances possible applicable available afford legal can do options choices able allowed doable feasible
 serve server endpoint api rest http web host
 board widget edit editor interactive gui ui
 show print pretty display summary table stats statistics
 __version__ version
 """
-"""Groups of words with similar meanings, one group per line."""
+"""Groups of words with similar meanings, one group per line. The lines of a long group begin with the same two words."""
 FILLERS = frozenset(
     {
         "get",
@@ -162,12 +190,16 @@ ENOUGH, FAR = 0.7, 0.1
 """Minimum score of a suggested name, and the amount by which each attribute or call on the way to the name reduces the score."""
 MOST, NEAR = 3, 0.3
 """Maximum number of suggested names, and maximum difference of their scores from the best score."""
+FAR_ROOT = 3
+"""The distance of objects that aren't reachable by attributes and calls."""
+ROOTS = ("plan", "result", "scene", "memory", "confab")
+"""The kinds of objects that every user has, and the module; the kinds whose names are suggested first are first."""
 
 
 @cache
 def stem(word: str) -> str:
     """Return the stem of a word, for example ``simulat`` for ``simulators``."""
-    return re.sub(r"(?<=\w{5})(ation|ing|ion|er|or|ed|e)$", "", re.sub(r"(?<=[^s])s$", "", word))
+    return re.sub(r"(?<=\w{5})(ation|ing|ion|er|or|ed|e)$", "", re.sub(r"(?<=[^s])s$", "", re.sub(r"ies$", "y", word)))
 
 
 @cache
@@ -188,16 +220,23 @@ def alike(one: str, other: str) -> float:
     return near if near > 0.8 and min(len(one), len(other)) > 3 else 0.0
 
 
+@cache
+def known_words() -> frozenset[str]:
+    """Return the stems of the words in `MEANINGS`, and the stems of the longer words in the tables."""
+    listed = (words.split() for table in HINTS.values() for words in table.values())
+    return frozenset(meanings()) | {stem(word) for names in listed for word in names if len(word) > SHORT}
+
+
 def segments(run: str) -> tuple[str, ...]:
     """Split a text without separators into known words; return an empty tuple if this is impossible.
 
     >>> segments("simulateplan"), segments("xyzzy")
     (('simulate', 'plan'), ())
     """
-    if stem(run) in meanings() or run in FILLERS:
+    if stem(run) in known_words() or run in FILLERS:
         return (run,)
     for end in range(len(run) - 2, 2, -1):
-        if (stem(run[:end]) in meanings() or run[:end] in FILLERS) and (rest := segments(run[end:])):
+        if (stem(run[:end]) in known_words() or run[:end] in FILLERS) and (rest := segments(run[end:])):
             return (run[:end], *rest)
     return ()
 
@@ -240,9 +279,9 @@ def places(kind: str) -> Iterator[tuple[str, str, int]]:
             if there not in seen:
                 seen.add(there)
                 waiting.append((there, f"{before}{way}.", far + 1))
-    for there in ("confab", "scene", "result", "plan", "memory"):
+    for there in ROOTS:
         if there not in seen:
-            yield there, f"{there}.", 3
+            yield there, f"{there}.", FAR_ROOT
 
 
 def score(wanted: tuple[str, ...], name: str, doc: str) -> float:
@@ -263,12 +302,18 @@ PART = 0.6
 """Score of a matching word that is only a part of a longer name in the table."""
 OWN = 0.1
 """Bonus for a matching word that is the name which the table's entry suggests."""
-UNKNOWN = 0.4
-"""Weight of a word that occurs in no entry of a table."""
+SYNONYM = 0.99
+"""Maximum score of a word that an entry of a table has by its meaning only."""
+SHORT = 3
+"""Maximum length of the words of tables that aren't looked for inside other words."""
+UNKNOWN, KNOWN = 0.4, 0.7
+"""Weights of a word that occurs in no entry of a table: of a word without a known meaning, and of a word with one."""
 HALF = 0.75
 """Factor for an entry of a table in which all matching words are only parts of longer names."""
-KNOWN_WORDS = 0.4
-"""An entry of a table must have at least this share of the words of a wrong name; rare words weigh more."""
+KNOWN_WORDS, SURE = 0.4, 0.9
+"""An entry of a table must have at least the first share of the words of a wrong name; with the second share, no other entries are
+suggested. Rare words weigh more.
+"""
 
 
 def whole(table: Mapping[str, str], name: str) -> str:
@@ -280,36 +325,118 @@ def whole(table: Mapping[str, str], name: str) -> str:
     return ""
 
 
-def by_words(table: Mapping[str, str], wanted: tuple[str, ...], least: float = KNOWN_WORDS) -> str:
-    """Return the key of the entry of a table that contains the most of the wanted words.
+def same_words(table: Mapping[str, str], wanted: tuple[str, ...]) -> str:
+    """Return the key of the entry of a table that has a name with exactly the wanted words, or an empty text.
 
-    The weight of a word is greater if fewer entries have it. If no entry has enough of the words, an empty text is returned.
+    >>> same_words({"with_fact": "add_fact set", "facts": "state"}, ("facts", "add"))
+    'with_fact'
+    """
+    found = [
+        (len(name), len(right), right)  # the longer names have fillers
+        for right, names in named(table).items()
+        for name in names
+        if {*map(stem, words_of(name))} == {*map(stem, wanted)}
+    ]
+    return min(found)[-1] if found else ""
+
+
+def named(table: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
+    """Return the names of each entry of a table: first the name that the entry suggests, then the wrong names.
+
+    >>> named({"confab.load(SCENE).plan()": "solve search"})
+    {'confab.load(SCENE).plan()': ('plan', 'solve', 'search')}
+    """
+    own = {right: re.split(r"[ ,]", re.sub(r"\([^()]*\)", "", right))[0].rpartition(".")[2] for right in table}
+    return {right: (own[right], *others.split()) for right, others in table.items()}
+
+
+def by_words(
+    table: Mapping[str, str], wanted: tuple[str, ...], least: float = KNOWN_WORDS, meant: bool = False
+) -> list[str]:
+    """Return the keys of the entries of a table that contain most of the wanted words, the best key first.
+
+    The weight of a word is greater if fewer entries have it. With `meant`, a word that no entry has stands for words with the same
+    meaning. If no entry has enough of the words, the list is empty.
 
     >>> by_words({"with_fact": "add set", "with_goal": "add", "facts": "state"}, ("add", "goal"))
-    'with_goal'
+    ['with_goal']
     """
-    bags, same = dict[str, dict[str, float]](), dict[str, int]()
-    for right, others in table.items():
-        own = re.split(r"[ ,]", re.sub(r"\([^()]*\)", "", right))[0].rpartition(".")[2]  # the last call
-        names = (own, *others.split())
+    bags, asked = dict[str, dict[str, float]](), dict.fromkeys(map(stem, wanted))
+    for right, names in named(table).items():
         bag = bags.setdefault(right, {})
         for number, name in enumerate(names):
-            words = words_of(name)
-            if {*map(stem, words)} == {*map(stem, wanted)}:
-                same[right] = min(same.get(right, len(name)), len(name))
-            for word in map(stem, words):
-                bag[word] = max(bag.get(word, 0.0), 1.0 + OWN * (number == 0) if len(words) == 1 else PART)
-    if same:
-        return min(same, key=lambda right: (same[right], len(right)))  # the longer names have fillers
+            words = {*map(stem, words_of(name))}
+            full = len(words) == 1 or words <= asked.keys()
+            for word in words:
+                bag[word] = max(bag.get(word, 0.0), 1.0 + OWN * (number == 0) if full else PART)
     many = Counter(word for bag in bags.values() for word in bag)
-    weights = {word: many[word] ** -0.5 if many[word] else UNKNOWN for word in map(stem, wanted)}
+    weights = {word: many[word] ** -0.5 if many[word] else UNKNOWN for word in asked}
+    for word in [word for word in asked if meant and word not in many]:
+        weights[word] = by_meaning(word, bags, many)
     worth = {
         right: sum(weights[word] * bag.get(word, 0.0) for word in weights)
         * (1.0 if any(bag.get(word, 0.0) >= 1.0 for word in weights) else HALF)
+        / sum(weights.values())
         for right, bag in bags.items()
     }
-    best = max(worth, key=lambda right: worth[right], default="")
-    return best if best and worth[best] >= least * sum(weights.values()) else ""
+    best = sorted((right for right in worth if worth[right] >= least), key=lambda right: -worth[right])[:MOST]
+    return [
+        right for right in best if right == best[0] or (worth[best[0]] < SURE and worth[right] >= worth[best[0]] / 2)
+    ]
+
+
+def by_meaning(word: str, bags: Mapping[str, dict[str, float]], many: Mapping[str, int]) -> float:
+    """Add a word that no entry has to the entries that have words with the same meaning, and return the weight of the word."""
+    lines = meanings().get(word, frozenset())
+    same = [other for other, found in meanings().items() if lines & found and other in many]
+    shares = {right: sum(bag.get(other, 0.0) / many[other] for other in same) for right, bag in bags.items()}
+    most = max(shares.values(), default=0.0)
+    for right, share in shares.items():
+        if share > 0:
+            bags[right][word] = SYNONYM * share / most
+    return KNOWN if most else UNKNOWN
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names as text: ``a, b, or c``."""
+    return ", or ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
+
+
+def of_form(kind: str, name: str) -> str:
+    """Return the expression for a name of an object of another library that an object is converted to, or an empty text.
+
+    >>> of_form("plan", "groupby"), of_form("scene", "subject_objects"), of_form("plan", "xyzzy")
+    ('to_dataframe().groupby()', 'graph.subject_objects()', '')
+    """
+    for form, path in FORMS.get(kind, {}).items():
+        home, _, cls = path.rpartition(".")
+        try:
+            found = getattr(getattr(import_module(home), cls), name, None)
+        except ImportError:  # the library of an extra isn't installed
+            continue
+        if found is not None:
+            return f"{form}.{name}{'()' if callable(found) else ''}"
+    return ""
+
+
+def elsewhere(kind: str, name: str, most: int) -> str:
+    """Return what the table of another kind of object suggests for a name; `most` attributes or calls lead to such an object.
+
+    >>> elsewhere("confab", "load_result", 1), elsewhere("result", "groupby", 1), elsewhere("step", "groupby", 1)
+    ('confab.load(SCENE).read_result(FILE)', 'plan.to_dataframe().groupby()', '')
+    """
+    for there, before, far in places(kind):
+        if there == kind or far > most:
+            continue
+        if name in described(there):
+            return before + name
+        if right := whole(HINTS.get(there, {}), name):
+            first = re.match(r"\w*", right)
+            relative = first is not None and first[0] in described(there) and not right.startswith("scene.")
+            return before + right if relative else right
+        if right := of_form(there, name):
+            return before + right
+    return ""
 
 
 def guessed(kind: str, name: str, known: Iterable[str] = ()) -> str:
@@ -332,7 +459,16 @@ def guessed(kind: str, name: str, known: Iterable[str] = ()) -> str:
         return ""
     aside = {kind, *(OF_MODULE if kind == "confab" else ())}
     wanted = tuple(word for word in words_of(name) if stem(word) not in map(stem, aside)) or words_of(name)
-    return by_words(table, wanted) or _described_as(kind, name)
+    return (
+        same_words(table, wanted)
+        or of_form(kind, name)
+        or elsewhere(kind, name, FAR_ROOT - (len(wanted) == 1))  # one word may mean different things in distant objects
+        or listed(by_words(table, wanted, meant=len(wanted) > 1))
+        or elsewhere(kind, name, FAR_ROOT)
+        or listed(by_words(table, wanted, meant=True))
+        or _described_as(kind, name)
+        or listed(by_words(table, wanted, KNOWN_WORDS / 2, meant=True))
+    )
 
 
 def _described_as(kind: str, name: str) -> str:
@@ -346,8 +482,7 @@ def _described_as(kind: str, name: str) -> str:
         for known, doc in described(there).items()
     }
     ranked = sorted(worth, key=lambda each: (-worth[each], len(each), each))[:MOST]
-    told = [each for each in ranked if worth[each] >= max(ENOUGH, worth[ranked[0]] - NEAR)]
-    return ", or ".join(filter(None, (", ".join(told[:-1]), *told[-1:])))
+    return listed([each for each in ranked if worth[each] >= max(ENOUGH, worth[ranked[0]] - NEAR)])
 
 
 def chosen(name: str, known: Iterable[str]) -> str:
@@ -367,9 +502,10 @@ def chosen(name: str, known: Iterable[str]) -> str:
             return plain[there[0]]
         if there:
             rows[there[0]] = f"{rows.get(there[0], '')} {rights} {others}"
-    if (meant := by_words(rows, words_of(asked), 0.1 + PART)) and not get_close_matches(
-        asked, plain, n=1, cutoff=TYPED
-    ):
+    words = words_of(asked)
+    if (
+        meant := same_words(rows, words) or next(iter(by_words(rows, words, 0.1 + PART)), "")
+    ) and not get_close_matches(asked, plain, n=1, cutoff=TYPED):
         return plain[meant]
     worth = {each: score(words_of(name), each, "") for each in known}
     best = max(worth, key=lambda each: worth[each], default="")
@@ -401,4 +537,5 @@ def command(name: str, known: Iterable[str]) -> str:
     if meant or get_close_matches(name, [*known], n=1, cutoff=TYPED):
         return meant
     wanted = words_of(name.replace("-", "_"))
-    return by_words(words, tuple(word for word in wanted if word not in OF_MODULE) or wanted)
+    wanted = tuple(word for word in wanted if word not in OF_MODULE) or wanted
+    return same_words(words, wanted) or next(iter(by_words(words, wanted)), "")

@@ -83,10 +83,10 @@ SHOW = (
 )
 SCENE = {
     "title": "label name caption heading display_name labelled get_title comment description_text",
-    "knowledge.prefixes": "prefixes namespace prefix ns prefix_map bind namespace_manager",
+    "knowledge.prefixes": "prefixes namespace prefix ns prefix_map bind ",
     "save(FILE)": "save_state save_to to_path serialize serialise write dump write_ttl to_file save_as store "
     "export_owl to_owl_file export_ttl save_scene write_file write_graph to_turtle_file",
-    "query(TEXT), which reads inferred facts": "inferred inferred_graph infer reason run_reasoner entailments "
+    "query(TEXT), which reads inferred facts": "sync_reasoner inferred inferred_graph infer reason run_reasoner entailments "
     "entailed materialize materialise closure owlrl expand",
     "query(TEXT), or plan()": "search",
     "query": "ask sparql select sparql_query execute_query run_query search_one rows fetch question queries "
@@ -105,8 +105,8 @@ SCENE = {
     "create_object add_node add_edge add_class add_behavior add_action spawn add_fluent add_statement add_rule "
     "add_axiom add_constraint add_location add_robot add_type add_property parse_into extend",
     "plan().plan.to_networkx(), or graph": "nodes edges networkx",
-    "graph": "named_graphs triples yaml rdf to_graph rdflib subjects predicates_of json to_dict to_json_ld turtle ttl "
-    "value_of statements quads to_string n3 subject_objects predicate_objects knowledge_graph axioms neighbors "
+    "graph": "named_graphs yaml rdf to_graph rdflib predicates_of json to_dict to_json_ld turtle ttl "
+    "value_of statements quads to_string n3 knowledge_graph axioms neighbors "
     "neighbours labels comments annotations to_owl_xml dataset namespaces_graph property_values",
     "plan": "find_path plan_path plan_motion solve find_plan make_plan planner run_planner replan compute_plan astar "
     "policy find_solution plan_task reach achieve optimise optimize solution solver plan_goal plans possible_plans "
@@ -121,10 +121,11 @@ SCENE = {
     "objects": "world_objects worldobjects individuals instances things entities objects_of_type nodes_of_type "
     "members subjects_of items object user_objects get_instances names_of_objects constants list_objects bodies "
     "search_objects find_object object_names names_of",
-    "facts": "head start_state perceive sense state initial initial_state init observe explicit_initial_values "
+    "facts": "planning_scene pose position location position_of head start_state perceive sense state initial "
+    "initial_state init observe explicit_initial_values "
     "initial_value initial_facts holds true_facts world_state fact value belief is_true check_fact fluent_values "
     "current_facts init_state atoms initial_defaults literals static_facts obs get_obs get_property predicate_values "
-    "where get_location location_of position_of current_state is_holding current has pretty_facts state_dict "
+    "where get_location location_of current_state is_holding current has pretty_facts state_dict "
     "fact_list",
     "goals": "goal_test goal_state get_goals task goal goal_facts objective desired wanted goal_conditions target "
     "goal_description current_goal goal_list list_goals",
@@ -136,11 +137,11 @@ SCENE = {
     "problem.domain.situations": "situation_types fluent predicate properties object_properties data_properties "
     "situation observation_space attributes state_variables features",
     "problem.relations": "static relation",
-    "problem.classes": "classes types sorts user_types hierarchy taxonomy class_tree type_hierarchy subclasses "
-    "object_types get_class kinds is_a class_hierarchy get_types list_classes locations places cups rooms tables "
+    "problem.classes": "kinds classes types sorts user_types hierarchy taxonomy class_tree type_hierarchy subclasses "
+    "object_types get_class is_a class_hierarchy get_types list_classes locations places cups rooms tables "
     "surfaces bottles containers",
     "problem.domain": "domain domain_name",
-    "problem": "up_problem planning_problem as_problem task_definition ground problem_kind",
+    "problem": "up_problem planning_problem as_problem task_definition ground",
     "to_pddl()": "pddl domain_pddl problem_pddl to_domain",
     "export": "write_pddl save_pddl export_pddl dump_pddl",
     "to_unified_planning()": "unified_planning up to_unified",
@@ -158,7 +159,7 @@ SCENE = {
     "embodiment": "body urdf gripper joints geometry kinematics meshes poses workspace links arm agents camera shapes "
     "hands sensors table",
     "iri": "ontology_iri get_iri uri base_iri identifier base url id",
-    "knowledge.path": "path file filename source location folder",
+    "knowledge.path": "path file filename source folder",
     "serve": "endpoint server start_server web api host http app rest open_page browser",
     "board": "widget editor interactive gui ui dashboard notebook",
     "construct": "constructs",
@@ -167,7 +168,7 @@ SCENE = {
     "from_path from_url include reset restore undo from_name create make build new from_scene from_yaml from_owl "
     "from_text",
     "confab.validate(FILE)": "check violations shacl_report validate check_consistency consistent lint shacl errors "
-    "valid sync_reasoner warnings check_scene inconsistent_classes problems consistency",
+    "valid warnings check_scene inconsistent_classes problems consistency",
     "confab.generate(FAMILY)": "generate random sample random_scene",
     "confab.Memory.of(scene).learn(scene, plan)": "learn memory train experience fit remember teach",
     "plan().report(FILE)": "report html page write_report save_report",
@@ -192,6 +193,7 @@ SCENE = {
     "verify(video=FILE)": "video film movie record animate save_video gif",
     "confab.practise(…)": "benchmark evaluate_memory curve",
     "graph.update(TEXT)": "sparql_update update_query execute_update run_update insert_data delete_data",
+    "to_unified_planning().kind": "kind problem_kind",
 }
 RESULT = {
     "save(FILE)": "to_val sas_plan plan_file",
@@ -242,7 +244,7 @@ RESULT = {
     "labels": "label labelled names words natural_language sentences captions verbalize in_words say narrate "
     "describe_steps in_english",
     "print(result), or report(FILE)": SHOW,
-    "result.plan == other.plan": COMPARE,
+    "result.plan == other.plan (confab.history.compared compares stored runs)": COMPARE,
     "copy.deepcopy(result)": COPY,
     "scene.plan()": "replan plan_again repair again redo resolve next",
     "scene.read_result(FILE)": "load from_file read from_json parse load_plan read_plan from_dict load_result "
@@ -271,12 +273,11 @@ PLAN = {
     "total_steps shape n_levels num_levels levels_count step_count",
     "walk()": "iter traverse all_steps visit descendants dfs preorder iterate all_actions flatten_all recursive "
     "every_step iter_steps",
-    "to_networkx()": "graph networkx nx digraph tree successors predecessors neighbors neighbours adjacency adj "
-    "in_edges out_edges edges dag hierarchy",
+    "to_networkx()": "graph networkx nx digraph tree  dag hierarchy",
     "to_dot()": "dot graphviz draw plot render pydot png visualize visualise figure image",
-    "to_dataframe()": "dataframe df to_pandas table pandas",
+    "to_dataframe()": "to_csv csv dataframe df to_pandas table pandas",
     "json()": "to_json to_dict dict dumps serialize data to_yaml asdict jsonable",
-    "to_records()": "records rows to_dicts csv",
+    "to_records()": "records rows to_dicts ",
     "index(STEP)": "find position locate index_of find_step get",
     "scene.verify(plan)": "verify simulate check validate physics rollout valid simulation test check_plan "
     "is_applicable evaluate validate_plan",
@@ -301,7 +302,7 @@ PLAN = {
     "replace_action add_step replan repair substitute update set_step change refine splice clear remove_step concat "
     "merge join plus add_action map push unshift",
     "print(plan)": SHOW,
-    "plan == other": COMPARE,
+    "plan == other (confab.history.compared compares stored runs)": COMPARE,
     "copy.deepcopy(plan)": COPY,
     "confab export SCENE --bt (in a shell)": "behavior_tree bt behaviortree btcpp py_trees xml",
     "scene.to_pddl()": "pddl",
@@ -318,15 +319,15 @@ PLAN = {
 STEP = {
     "behavior": "name action operator action_name behaviour schema skill action_type verb type behavior_name kind "
     "what function_name",
-    "arguments": "args parameters params actual_parameters operands args_list object target inputs param_values "
+    "arguments": "items args parameters params actual_parameters operands args_list object target inputs param_values "
     "argument_names agent location robot hand subject values grounded ground_arguments objects_involved",
     "steps": "children substeps sub_steps refinement actions subplan decomposition sub_plan subtasks expand "
     "sub_actions primitive leaf body tasks",
     "bindings": "variables binding substitution assignment env free_variables variable_values",
     "walk()": "iter traverse descendants dfs all_steps preorder leaves primitives iterate",
-    "path": "position parent address index_path location_in_tree ancestors depth coordinates order tree_path",
+    "path": "position address index_path location_in_tree ancestors coordinates order tree_path",
     "id": "number index key identifier uid uuid iri step_id action_id ident",
-    "level": "layer height abstraction abstraction_level level_number tier",
+    "level": "depth layer height abstraction abstraction_level level_number tier",
     "rank": "score cogency weight priority probability",
     "scene.behaviors[step.behavior].preconditions": "precondition condition requires pre requirements applicable "
     "guard precond add_list needs",
@@ -344,16 +345,17 @@ STEP = {
     "scene.execute(plan)": "execute run perform apply do act call dispatch tick play send successor done execute_step "
     "completed started",
     "print(step)": SHOW,
-    "json()": "to_json dict asdict serialize data to_record items keys",
+    "json()": "to_json dict asdict serialize data to_record ",
     "step == other": COMPARE,
     "copy.deepcopy(step)": COPY,
     "plan.index(step)": "next previous next_step prev previous_step successors predecessors before after sibling",
     "result.problem": "world state domain",
+    "result.plan[step.path[:-1]]": "parent up owner container",
 }
 EXECUTION = {
     "reached": "success succeeded ok solved done finished goal_reached complete verified result terminated is_success "
     "achieved passed truncated",
-    "plan": "steps actions executed done_plan trace executed_steps performed path action_history executed_plan "
+    "plan": "items steps actions executed done_plan trace executed_steps performed path action_history executed_plan "
     "primitives final_plan new_plan current_plan last_plan",
     "episode": "history log trajectory record steps_taken rollout transcript",
     "episode.events": "events observations states observed seen messages event_log obs timeline state_history feedback",
@@ -369,8 +371,9 @@ EXECUTION = {
     "save": "dump write to_file store export persist save_json save_as write_ttl to_ttl save_episode",
     "summary()": "describe explain message text info stats statistics print pretty metrics string str",
     "scene.read_episode(FILE)": "load from_file open read from_json parse",
-    "episode.observed": "state final_state end_state last_state state_after current_state final_facts facts final "
-    "robot_state joint_state get_joint_states state_of final_observations",
+    "episode.observed": "pose position location state final_state end_state last_state state_after current_state "
+    "final_facts facts final "
+    "robot_state state_of final_observations",
     "graph()": "networkx to_graph nx tree dot digraph",
     "scene.execute()": "resume continue_ restart run step again rerun execute repeat reset retry",
     "memory.learn(scene, execution)": "learn remember train memory teach",
@@ -381,11 +384,13 @@ EXECUTION = {
     "scene.execute(world=WORLD)": "world env environment backend robot simulate step_simulation simulation",
     "violations": "constraints violated broken_constraints violated_constraints",
     "episode.reasons": "failure_reason why_failed error_message why",
+    "confab export SCENE --trajectory FILE (in a shell)": "joint_states joint_state joints joint_positions "
+    "joint_trajectory motions",
 }
 REPORT = {
     "verified": "success succeeded ok passed valid result reached solved status good_plan is_verified outcome verdict "
     "correct feasible is_success",
-    "rollouts": "runs trials simulations episodes verdicts results samples all_rollouts each attempts",
+    "rollouts": "items runs trials simulations episodes verdicts results samples all_rollouts each attempts",
     "shown.failure": "failure error first_failure failed why reason fault failed_step failed_rollouts cause explain "
     "failing why_failed",
     "rate()": "success_rate accuracy score probability reliability percentage mean pass_rate confidence average "
@@ -408,7 +413,7 @@ REPORT = {
 MEMORY = {
     "confab.Memory.load(FILE)": "open read from_file parse restore from_ttl loads from_path",
     "confab.Memory.of(SCENE)": "new create empty for_scene from_scene init blank make",
-    "save(FILE)": "write dump store to_file export persist save_to serialize to_ttl to_turtle commit write_ttl to_rdf",
+    "save(FILE)": "state_dict write dump store to_file export persist save_to serialize to_ttl to_turtle commit write_ttl to_rdf",
     "learn(RESULT)": "add train update fit record remember append observe add_episode add_plan store_plan insert "
     "learn_from add_experience partial_fit learn_episode reinforce add_example put experience_replay step backward "
     "push",
@@ -451,7 +456,7 @@ PROBLEM = {
     "initial": "fluent_values init initial_state initial_values state explicit_initial_values facts initial_facts "
     "start start_state",
     "goal": "goals goal_state target objective tasks goal_facts goal_condition",
-    "individuals": "objects all_objects instances constants user_objects things",
+    "individuals": "items objects all_objects instances constants user_objects things",
     "classes": "types user_types sorts kinds hierarchy",
     "scene": "name iri title label uri",
     "relations": "static_predicates static static_facts",
@@ -505,7 +510,7 @@ OUTCOME = {
 EPISODE = {
     "done": "steps actions executed plan executed_steps performed trace",
     "planned": "original_plan first_plan initial_plan",
-    "events": "log history observations records timeline",
+    "events": "items log history observations records timeline",
     "course": "trajectory states state_history",
     "observed": "final_state state end_state final last_state",
     "initial": "initial_state start_state init",
@@ -686,6 +691,8 @@ OPTIONS = {
 If a key contains several names, the first one that the called function or command accepts is suggested.
 """
 NEEDLESS = {
+    "a call returns one plan; result.why_not(WHAT) and scene.plan(optimal=True) look for others": "k n n_plans num_plans "
+    "number_of_plans top_k alternatives diverse all_plans max_plans",
     "state the values of a variable in the query: VALUES ?x { :cup1 }": "bindings binding initbindings init_bindings "
     "substitutions values params parameters variables vars",
     "the same call gives the same result in every process": "seed random_seed random_state rng set_seed",

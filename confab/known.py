@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from confab.reasoner.embodiment.values import Embodiment
     from confab.reasoner.graph.mirror import Mirror
     from confab.reasoner.graph.query_process import QueryLimits
+    from confab.reasoner.reading.rows import OntologySchema
 
 GUESSING.append("confab.guessing")
 log = logging.getLogger(__name__)
@@ -91,6 +92,13 @@ class Known(metaclass=RightNames):
         self.settle()
         self.knowledge.require_whole()
         return read(self.knowledge)
+
+    def read_whole(self, schema: OntologySchema) -> Problem:
+        """Return the property `problem`; `schema` is the schema of the scene, which isn't read again."""
+        if "reading" not in self.__dict__:
+            self.reading = read(self.knowledge, schema)
+            self.knowledge.confirm()
+        return self.problem
 
     @property
     def iri(self) -> str:

@@ -74,7 +74,8 @@ def exported(problem: Problem, level: int | None) -> Exported:
             "the scene has no behaviours, so that there is no level to export; import a domain that has some"
         )
     if level is not None and level not in levels:
-        raise KnowledgeError(f"no level {level}; this scene has {', '.join(map(str, levels))}")
+        files = "" if isinstance(level, int) else "; scene.export(FOLDER) writes files"
+        raise KnowledgeError(f"no level {level}; this scene has {', '.join(map(str, levels))}{files}")
     return to_pddl(problem, level)
 
 

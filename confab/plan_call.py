@@ -31,7 +31,7 @@ from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import Deadline, LimitError
 from confab.reasoner.memory.links import Links
 from confab.reasoner.reading.goals import with_goals
-from confab.reasoner.reading.problem import Reading, read
+from confab.reasoner.reading.problem import Reading
 from confab.reasoner.reading.relevance import recognise
 from confab.reasoner.refining import never_done, without
 from confab.reasoner.symbols import Behavior, GroundBehavior, Problem
@@ -81,11 +81,7 @@ class PlanningTask:
 
     def whole(self) -> Problem:
         """Return the problem with all individuals of the scene."""
-        scene = self.scene
-        if "reading" not in scene.__dict__:
-            scene.reading = read(scene.knowledge, self.reading.schema)
-            scene.knowledge.confirm()
-        return with_goals(scene.problem, self.goals)
+        return with_goals(self.scene.read_whole(self.reading.schema), self.goals)
 
     def with_measured_durations(self, problem: Problem) -> Problem:
         """Return a problem with the durations that the memory has measured."""

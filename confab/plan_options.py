@@ -60,7 +60,10 @@ class PlanOptions:
         """Raise `KnowledgeError` if an option is invalid or options exclude each other."""
         checked_minimise(self.minimise)
         if self.level is not None and not self.by_engine:
-            raise KnowledgeError("a level is chosen for an engine; name one, e.g. engine='fast-downward'")
+            raise KnowledgeError(
+                "a level is chosen for an engine; name one, e.g. engine='fast-downward' "
+                "(plan.at_level(LEVEL) has the steps of a level)"
+            )
         if self.by_engine and (self.mode == "paper" or self.asks_for_least):
             raise KnowledgeError("an engine plans by itself; leave out optimal=True and mode='paper'")
         if self.by_engine and not self.leave_levels:

@@ -344,6 +344,10 @@ class Result(metaclass=RightNames):
         """
         from confab.why import BY, find_step, why_not
 
+        if isinstance(seconds, str):
+            raise KnowledgeError(
+                "the alternative is one text, e.g. why_not('cup2 LOCATION location8'), or a tuple of words"
+            )
         check_seconds("seconds", seconds)
         words = " ".join(several(str(asked) if isinstance(asked, Step) else asked)).split()
         if words[:1] and words[0].isdecimal():  # the text of a step begins with its ID

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from io import IOBase
@@ -398,15 +397,10 @@ def load_text(content: bytes) -> Scene:
         file.write_bytes(content)
 
         def said(fault: object) -> str:
-            text = re.sub(
-                r"put its file beside .*",
-                "a scene that is given as text can import only shipped ontologies",
-                str(fault),
-            )
-            return text.replace(f"{folder}/", "")
+            return str(fault).replace(f"{folder}/", "")
 
         try:
-            graph = load_graph(file, tolerant=True)
+            graph = load_graph(file, tolerant=True, alone=True)
         except KnowledgeError as error:
             raise KnowledgeError(said(error)) from error
         graph.faults[:] = map(said, graph.faults)

@@ -202,8 +202,14 @@ def known_as(kind: str) -> Callable[[C], C]:
         def lacking(self: object, name: str) -> NoReturn:
             raise WrongNameError(kind, name, type(self))
 
+        def without_items(self: object, index: object) -> NoReturn:
+            """Raise `TypeError`; Python also calls this method for an iteration, and for the operator ``in``."""
+            raise TypeError(f"{kind} has no items{_suggested(kind, 'items')}")
+
         type.__setattr__(cls, "_kind", kind)
         type.__setattr__(cls, "__getattr__", lacking)  # hidden from type checkers, which report wrong names
+        if not any(hasattr(cls, each) for each in ("__getitem__", "__iter__")):
+            type.__setattr__(cls, "__getitem__", without_items)
         return cls
 
     return decorated
@@ -272,7 +278,8 @@ def right_arguments(function: Callable[P, R], bound: int = 0) -> Callable[P, R]:
                 meant = next((import_module(each).chosen(name, takes) for each in GUESSING), "")
                 why = next((import_module(each).needless(name, takes) for each in GUESSING), "")
                 all_of_them = ", ".join((*several, *takes)) or "no arguments"
-                hint = f"did you mean '{meant}'?" if meant else why or f"it takes {all_of_them}"
+                use = f": {(function.__doc__ or '').split(chr(10))[0]}" if several and not takes else ""
+                hint = f"did you mean '{meant}'?" if meant else why or f"it takes {all_of_them}{use}"
                 raise TypeError(f"{function.__name__}() takes no '{name}'; {hint}")
         if most is not None and len(given) > bound + most:
             named_only = ", ".join(f"{each}=" for each in own[most:])
@@ -300,6 +307,12 @@ def _keys(unpacked: str, module: str) -> Iterable[str]:
     home, _, name = unpacked.removeprefix("Unpack[").removesuffix("]").rpartition(".")
     keys: Mapping[str, object] = getattr(import_module(f"confab.{home}" if home else module), name).__annotations__
     return keys
+
+
+def _suggested(kind: str, name: str, known: Collection[str] = ()) -> str:
+    """Return ``; use x`` with the name that a wrong name most likely means, or an empty text."""
+    meant = next((import_module(each).guessed(kind.split()[-1], name, known) for each in GUESSING), "")
+    return f"; use {meant}" if meant else ""
 
 
 class WrongNameError(AttributeError):
@@ -331,10 +344,10 @@ class WrongNameError(AttributeError):
         every = {*dir(there), *getattr(there, "__dataclass_fields__", ())}
         known = sorted(each for each in every if not each.startswith("_"))
         asked = "_".join(filter(None, (self._verb, name)))
-        meant = next((import_module(each).guessed(kind.split()[-1], asked, known) for each in GUESSING), "")
-        if meant:
-            return f"{text}; use {meant}"
-        return text + nearest(name, known, f"it has {', '.join(known)}" if len(known) <= FEW_NAMES else "")
+        return text + (
+            _suggested(kind, asked, known)
+            or nearest(name, known, f"it has {', '.join(known)}" if len(known) <= FEW_NAMES else "")
+        )
 
     def __reduce__(self) -> tuple[type[AttributeError], tuple[str]]:
         """Return the reduced form for copying and pickling: an `AttributeError` with the message."""

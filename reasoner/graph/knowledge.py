@@ -233,6 +233,7 @@ def load(
     store: ox.Store | None = None,
     tolerant: bool = False,
     faults: list[UpdateFault] | None = None,
+    alone: bool = False,
 ) -> KnowledgeGraph:
     """Load a scene with all its imports, and its file of reachability facts if it exists.
 
@@ -247,6 +248,8 @@ def load(
         Whether to load an RDF file even if it isn't a complete scene; the attribute `faults` of the graph then has the reasons.
     faults : list of UpdateFault, optional
         A list that receives the faults in behaviours that are written as updates. Without this list, a fault raises an error.
+    alone : bool
+        Whether the file stands for a text, which can import only shipped ontologies.
 
     Raises
     ------
@@ -256,7 +259,7 @@ def load(
     given = [source] if isinstance(source, str | Path) else source
     path, *others = _scene_first([scene_file(one) for one in given])
     graph = KnowledgeGraph("", store=ox.Store() if store is None else store)
-    _load(graph, path, others, tolerant)
+    _load(graph, path, others, tolerant, alone)
     found = write_out(graph)
     if faults is not None:
         faults += found
@@ -326,7 +329,7 @@ def _said(file: Path, what: str) -> set[str]:
     return {term.value for term in found if isinstance(term, ox.NamedNode)}
 
 
-def _load(graph: KnowledgeGraph, path: Path, others: Sequence[Path], tolerant: bool) -> None:
+def _load(graph: KnowledgeGraph, path: Path, others: Sequence[Path], tolerant: bool, alone: bool) -> None:
     @contextmanager
     def forgiven() -> Iterator[None]:
         try:
@@ -360,7 +363,7 @@ def _load(graph: KnowledgeGraph, path: Path, others: Sequence[Path], tolerant: b
                 waiting.append((imported, path))
             elif imported not in done:
                 with forgiven():
-                    waiting.append((imported, given.get(imported) or _locate(imported, file, places)))
+                    waiting.append((imported, given.get(imported) or _locate(imported, file, places, alone)))
     reach = path.with_name(f"{path.stem}.reach.ttl")
     if reach.is_file():
         read_into(graph, reach, "reach")
@@ -480,7 +483,7 @@ def _imports(graph: KnowledgeGraph, iri: str) -> Sequence[str]:
     return [row[1].value for row in rows if isinstance(row[1], ox.NamedNode)]
 
 
-def _locate(iri: str, importer: Path, read: dict[Path, Mapping[str, Path]]) -> Path:
+def _locate(iri: str, importer: Path, read: dict[Path, Mapping[str, Path]], alone: bool) -> Path:
     """Return the file of an imported ontology, found in the catalog beside the importer, in the shipped catalog, or by its name."""
     beside = importer.with_name(ontology.CATALOG)
     for catalog in (beside, ontology.ROOT / ontology.CATALOG):
@@ -498,9 +501,11 @@ def _locate(iri: str, importer: Path, read: dict[Path, Mapping[str, Path]]) -> P
             return path
     web = iri.startswith(("http://", "https://"))
     fetch = f", or fetch it: confab fetch {iri} --into {importer.parent}" if web else ""
+    remedy = f"put its file beside this one or name it in the catalog{fetch} (nothing is fetched unasked)"
+    if alone:
+        remedy = "a scene that is given as text can import only shipped ontologies"
     raise KnowledgeError(
-        f"{importer}: imports <{iri}>, but neither {beside.name} in its folder nor the shipped catalog contains this IRI; "
-        f"put its file beside this one or name it in the catalog{fetch} (nothing is fetched unasked)"
+        f"{importer}: imports <{iri}>, but neither {beside.name} in its folder nor the shipped catalog contains this IRI; {remedy}"
     )
 
 

@@ -128,6 +128,13 @@ SAID: dict[str, tuple[Callable[[confab.Scene, confab.Result], object], str]] = {
         lambda scene, result: result.plan.index("0.1"),
         "is no step of the first level",
     ),
+    "an alternative in three arguments": (
+        lambda scene, result: result.why_not("B1_MOVE", "cup2", "location7"),  # type: ignore[arg-type]
+        "the alternative is one text",
+    ),
+    "a level of a plan": (lambda scene, result: scene.plan(level=2), "plan.at_level(LEVEL)"),
+    "three plans": (lambda scene, result: scene.plan(k=3), "why_not"),  # type: ignore[call-arg]
+    "PDDL in a folder": (lambda scene, result: scene.to_pddl("out"), "scene.export(FOLDER)"),  # type: ignore[arg-type]
     "a wrong column": (lambda scene, result: scene.query("SELECT ?o { ?o k:location ?l }")["ob"], "columns: o"),
 }
 

@@ -170,6 +170,38 @@ def test_a_wrong_name_is_matched_by_its_words(kind: str) -> None:
     assert guessed(kind, "xyzzy") == ""
 
 
+def test_a_name_of_another_library_s_object_leads_to_the_conversion_into_this_object() -> None:
+    assert guessed("scene", "isomorphic") == "graph.isomorphic()"
+    assert guessed("scene", "disjoint_classes") == "owl.disjoint_classes()"
+    assert guessed("plan", "number_of_nodes") == "to_networkx().number_of_nodes()"
+    pytest.importorskip("pandas")
+    assert guessed("plan", "iterrows") == "to_dataframe().iterrows()"
+    assert guessed("result", "iloc") == "plan.to_dataframe().iloc"
+
+
+def test_a_wrong_name_that_another_object_s_table_lists_leads_to_that_object() -> None:
+    asked = [("confab", "load_result"), ("result", "tail"), ("step", "to_file"), ("plan", "remove_goal")]
+    assert [guessed(*each) for each in asked] == [
+        "confab.load(SCENE).read_result(FILE)", "plan[-1]", "result.save(FILE)", "scene.with_goal",
+    ]  # fmt: skip
+
+
+def test_a_word_that_no_table_has_is_understood_by_words_with_the_same_meaning() -> None:
+    asked = {("scene", "inventory"): "objects", ("scene", "believe"): "with_fact", ("result", "went_well"): "solved"}
+    assert {each: guessed(*each) for each in asked} == asked
+
+
+def test_an_iteration_over_an_object_without_items_names_what_has_items(things: dict[str, object]) -> None:
+    for kind, right in {
+        "execution": "plan",
+        "memory": r"table\(\)",
+        "step": "arguments",
+        "problem": "individuals",
+    }.items():
+        with pytest.raises(TypeError, match=f"has no items; use {right}$"):
+            iter(things[kind]).__next__()  # type: ignore[call-overload]
+
+
 def test_the_error_on_a_scene_constructed_from_a_name_gives_the_call_of_load() -> None:
     with pytest.raises(TypeError, match=r"use confab\.load\('beverage-serving'\)"):
         confab.Scene("beverage-serving")  # type: ignore[arg-type]

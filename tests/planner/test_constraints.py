@@ -119,6 +119,7 @@ def test_a_violation_of_a_constraint_by_an_intervention_is_removed() -> None:
     assert len(done.episode.replans) == 1
     assert [text.partition(": ")[2] for text in done.violations] == ["CLASH must never be true, and it is true of bay3"]
     assert done.violations[0] in done.summary()
+    assert done.json()["violations"] == [*done.violations]
     assert confab.load("drums-small").execute().violations == ()
 
 
