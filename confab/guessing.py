@@ -121,7 +121,7 @@ seconds time timeout deadline limit runtime duration elapsed wall cpu clock
 search expanded expansions statistics stats nodes generated visited explored effort iterations evaluated
 reason why because unsolvable failure failed error explain justify cause rationale motive background
 report html page browser tab visualise visualize visualization render plot browser gantt chart
-picture draw show plot render image png map visualise visualize screenshot svg diagram thumbnail figure
+picture preview draw show plot render image png map visualise visualize screenshot svg diagram thumbnail figure
 video film movie gif mp4 animation
 graph triples rdf rdflib turtle ttl n3 jsonld serialize serialise save add
 networkx graph nx digraph tree
@@ -148,7 +148,7 @@ embodiment robot robots arms body urdf hardware gripper kinematics joints links
 iri uri namespace namespaces prefixes base
 names prefixes prefix namespaces namespace manager
 with_fact fact set assert tell put remove without change update insert assume modify transform clone copy believe suppose
-with_fact fact imagine pretend edit move
+with_fact fact imagine pretend edit move relocate shift displace swap
 with_goal goal set replace
 rate accuracy probability score
 label words text sentence name title
@@ -180,6 +180,9 @@ FILLERS = frozenset(
         "from",
         "what",
         "on",
+        "was",
+        "do",
+        "does",
     }
 )
 OF_ANY = frozenset({"plan", "planning", "search"})
@@ -199,7 +202,9 @@ ROOTS = ("plan", "result", "scene", "memory", "confab")
 @cache
 def stem(word: str) -> str:
     """Return the stem of a word, for example ``simulat`` for ``simulators``."""
-    return re.sub(r"(?<=\w{5})(ation|ing|ion|er|or|ed|e)$", "", re.sub(r"(?<=[^s])s$", "", re.sub(r"ies$", "y", word)))
+    return re.sub(
+        r"(?<=\w{5})(ation|ing|ion|er|or|ed|ful|e)$", "", re.sub(r"(?<=[^s])s$", "", re.sub(r"ies$", "y", word))
+    )
 
 
 @cache
@@ -462,6 +467,7 @@ def guessed(kind: str, name: str, known: Iterable[str] = ()) -> str:
     return (
         same_words(table, wanted)
         or of_form(kind, name)
+        or listed(by_words(table, wanted, SURE))
         or elsewhere(kind, name, FAR_ROOT - (len(wanted) == 1))  # one word may mean different things in distant objects
         or listed(by_words(table, wanted, meant=len(wanted) > 1))
         or elsewhere(kind, name, FAR_ROOT)
