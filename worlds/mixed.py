@@ -731,6 +731,8 @@ class _Draft(Vocabulary):
             if price is not None:
                 one = replace(one, cost=1.0, price=price)
                 one = replace(one, preconditions=(*one.preconditions, *([one.priced] if one.priced else [])))
+            elif self.chance(0.3):
+                one = replace(one, cost=0.0)
             found.append(one)
         self.rng = rng
         return found
