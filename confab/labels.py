@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from confab.planner.plan import Step
+from confab.reasoner.derivation import conditions_of_goal
 from confab.reasoner.graph.knowledge import KnowledgeGraph, text
 from confab.reasoner.names import Names, brief, known_as
 from confab.reasoner.sentences import denied, said
@@ -53,6 +54,9 @@ class Labels:
     def fact(self, fact: Fact) -> str:
         """Return a fact as a sentence."""
         situation, (about, *rest) = fact.symbol.situation, fact.symbol.arguments or ("",)
+        if goal := conditions_of_goal(self.domain, fact.symbol):
+            wanted = self.words.get(situation) or " and ".join(map(self.condition, goal))
+            return denied(wanted) if fact.value == FALSE else wanted
         kind = self.domain.situations.get(situation)
         boolean = kind is not None and kind.boolean
         unit = kind.quantity.unit if kind is not None and kind.quantity is not None else ""

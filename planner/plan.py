@@ -16,6 +16,7 @@ from confab.planner.certificates import Certificate
 from confab.reasoner.amounts import written
 from confab.reasoner.limits import current
 from confab.reasoner.names import RightNames, brief, known_as, right_names
+from confab.reasoner.sentences import said
 from confab.reasoner.symbols import Condition, Fact, Problem, State, Symbol
 
 if TYPE_CHECKING:
@@ -341,11 +342,14 @@ class Forgone:
         The cost of leaving the goal unmet.
     price : Fraction, optional
         The additional cost of a plan that also meets the goal, or None if no such plan was found.
+    conditions : tuple of Condition
+        The conditions of a goal with alternatives or quantifiers.
     """
 
     fact: Fact
     weight: Fraction
     price: Fraction | None
+    conditions: tuple[Condition, ...] = ()
 
     def __str__(self) -> str:
         more = (
@@ -353,7 +357,8 @@ class Forgone:
             if self.price is None
             else f"it would cost at most {written(self.price)} more"
         )
-        return f"{self.fact} (weight {written(self.weight)}; {more})"
+        goal = " and ".join(map(said, self.conditions))
+        return f"{self.fact}{goal and f', which means {goal}'} (weight {written(self.weight)}; {more})"
 
 
 @known_as("an outcome")

@@ -26,6 +26,7 @@ from typing import TypeAlias
 from confab.planner.plan import Forgone, Outcome, Status
 from confab.planner.plan_costs import cost_of
 from confab.planner.validation import unmet_goals
+from confab.reasoner.derivation import conditions_of_goal
 from confab.reasoner.limits import LimitError
 from confab.reasoner.symbols import Fact, Problem, Symbol
 
@@ -243,6 +244,7 @@ class _SoftGoalChoices:
                 other = self.cost(chosen | {symbol})
                 fact = Fact(symbol, self.problem.goal[symbol])
                 more = None if other is None else (other - compared).limit_denominator(PRECISION)
-                forgone.append(Forgone(fact, self.weights[symbol], more))
+                wanted = conditions_of_goal(self.problem.domain, symbol)
+                forgone.append(Forgone(fact, self.weights[symbol], more, wanted))
         bound = None if least is None else float(min(least - self.unmet(kept), cost))
         return self.task(kept), replace(outcome, forgone=tuple(forgone), bound=bound)

@@ -16,12 +16,23 @@ from confab.reasoner.symbols import (
     ClassCondition,
     Comparison,
     Condition,
+    Domain,
     EqualityCondition,
     RelationCondition,
     Rule,
+    Symbol,
     ValueCondition,
     Witness,
 )
+
+TASK = "Task"
+"""The class of tasks; the argument of a goal's derived situation type is a task."""
+
+
+def conditions_of_goal(domain: Domain, symbol: Symbol) -> tuple[Condition, ...]:
+    """Return the conditions of a goal with alternatives or quantifiers; the tuple is empty if the symbol isn't such a goal."""
+    kind, rules = domain.situations.get(symbol.situation), domain.rules.get(symbol.situation, ())
+    return rules[0].conditions if kind is not None and kind.arguments == (TASK,) and len(rules) == 1 else ()
 
 
 def needed(conditions: Sequence[Condition], negated: bool = False) -> Iterator[tuple[str, bool]]:

@@ -37,9 +37,11 @@ def in_order(aggregates: Mapping[str, Aggregate]) -> list[Aggregate]:
         ready = [name for name, one in waiting.items() if not read_by(one) & waiting.keys()]
         if not ready:
             name = min(waiting)
+            for _ in waiting:  # leads into a cycle
+                name = min(read_by(waiting[name]) & waiting.keys())
             raise DomainError(
-                f"the rule of {name} reads {' and '.join(sorted(read_by(waiting[name]) & waiting.keys()))}, "
-                f"so {name} depends on itself; remove one of these amounts from its rule"
+                f"{name} depends on itself, since its rule reads "
+                f"{' and '.join(sorted(read_by(waiting[name]) & waiting.keys()))}; remove one of these amounts from its rule"
             )
         for name in ready:
             found[name] = waiting.pop(name)

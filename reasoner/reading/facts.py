@@ -75,7 +75,15 @@ def facts_of(
     asked = individuals_named(domain, names)
     without_numbers = {relation: {row[:-1] for row in rows} for relation, rows in numbered.items()}
     for relation, rows in sorted({**relations, **without_numbers}.items()):
-        many = asked.get(relation, max(map(len, rows), default=0))
+        lengths = {len(row) for row in rows}
+        many, user = asked.get(relation, (max(lengths, default=0), ""))
+        if user and len(rows) > 1 and lengths != {many} and len(lengths) == 1:
+            (stated,) = lengths
+            raise KnowledgeError(
+                f"{user} names {many} individual{'s' * (many != 1)} for {relation}, but all facts of {relation} name {stated}; "
+                "state the missing individual, or remove the superfluous one",
+                names.iri(user) if user in names else "",
+            )
         for row in sorted(rows):
             if len(row) != many:
                 others = "behaviours and rules" if relation in asked else "others"
@@ -87,8 +95,8 @@ def facts_of(
     return {name: frozenset(pairs) for name, pairs in sorted({**relations, **numbered}.items())}, stated
 
 
-def individuals_named(domain: Domain, names: Names) -> dict[str, int]:
-    """Return the number of individuals in a row of each static relation, according to behaviours and rules.
+def individuals_named(domain: Domain, names: Names) -> dict[str, tuple[int, str]]:
+    """Return the number of individuals that behaviours and rules name for each static relation, with one that names them.
 
     Raises
     ------
@@ -110,7 +118,7 @@ def individuals_named(domain: Domain, names: Names) -> dict[str, int]:
                     "; name the same number in all conditions and calculations",
                     names.iri(behavior.name) if behavior.name in names else "",
                 )
-    return {relation: many for relation, (many, _) in found.items()}
+    return found
 
 
 def _check_numbers(relation: str, rows: Iterable[tuple[str, ...]], bare: Collection[tuple[str, ...]]) -> None:

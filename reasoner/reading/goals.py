@@ -10,7 +10,7 @@ from itertools import chain
 
 from confab.reasoner.aggregates.extrema import with_extrema
 from confab.reasoner.amounts import DECIMAL, Amount, bounds_written, written
-from confab.reasoner.derivation import needed
+from confab.reasoner.derivation import TASK, needed
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.language import is_variable, terms, walk
 from confab.reasoner.names import nearest
@@ -33,8 +33,6 @@ from confab.reasoner.symbols import (
     substituted,
 )
 
-TASK = "Task"
-"""The class of tasks; the argument of a goal's derived situation type is a task."""
 BOUNDS = re.compile(rf"((<=?|>=?|=)?{DECIMAL.pattern})(,(<=?|>=?|=)?{DECIMAL.pattern})*")
 """Notation of a number or bounds in a goal on an amount."""
 

@@ -280,7 +280,8 @@ class Parts(NodeReader):
             same = " and ".join(sorted(local_name(t) for t, other in zip(terms, called, strict=True) if other == name))
             raise KnowledgeError(
                 f"{local_name(iri)} has several terms called {name[1:]}: {same}; give each a name of its own, or let the price, "
-                f"the duration and the conditions of {local_name(iri)} refer to its own term"
+                f"the duration, the actors and the conditions of {local_name(iri)} refer to its own term",
+                iri,
             )
 
     def span(self, iri: str) -> Span:

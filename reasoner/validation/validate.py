@@ -168,7 +168,8 @@ def _validate_one(file: str | Path, deep: bool, done: Callable[[str], object]) -
         yield from _in_memory(path, graph, places)
         return
     for fault in faults:
-        why = "a behaviour whose update can't be read has no effect"
+        readers = "a behaviour whose update can't be read has no effect"
+        why = readers if fault.place.form == "update" else "a rule whose query can't be read defines nothing"
         yield places.in_update("update", fault.place, fault.what, why, fault.remedy)
     done(f"checking {path.name}")
     yield from _merged(graph, places)

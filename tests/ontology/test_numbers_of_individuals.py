@@ -15,7 +15,7 @@ FILES = {"canteen": ROOT / "domains/canteen.ttl", "canteen-small": ROOT / "scene
     ("file", "old", "new", "what"),
     [
         ("canteen", "c:argument2 :L2_DRIVE.spot ; c:relation :WAY", "c:relation :WAY",
-         "names 2 individuals; behaviours and rules name 1"),
+         "L2_DRIVE names 1 individual for WAY, but all facts of WAY name 2"),
         ("canteen-small", "c:about :tap ; c:argument2 d:dock", "c:about :tap",
          "WAY of tap names 1 individual; behaviours and rules name 2"),
         ("canteen", ":L1_REFILL.capacity a owl:NamedIndividual, c:Calculation ; c:about :L1_REFILL.jug ;",
