@@ -78,9 +78,9 @@ def facts_of(
         lengths = {len(row) for row in rows}
         many, user = asked.get(relation, (max(lengths, default=0), ""))
         if user and len(rows) > 1 and lengths != {many} and len(lengths) == 1:
-            (stated,) = lengths
+            (length,) = lengths
             raise KnowledgeError(
-                f"{user} names {many} individual{'s' * (many != 1)} for {relation}, but all facts of {relation} name {stated}; "
+                f"{user} names {many} individual{'s' * (many != 1)} for {relation}, but all facts of {relation} name {length}; "
                 "state the missing individual, or remove the superfluous one",
                 names.iri(user) if user in names else "",
             )

@@ -56,6 +56,20 @@ def test_a_goal_that_costs_more_than_its_weight_is_left_unmet_and_reported_with_
     assert not result.faults(result.plan)
 
 
+def test_an_unmet_goal_with_alternatives_is_reported_with_its_conditions(tmp_path: Path) -> None:
+    old = 'c:Comparison ; c:weight 8.0 ; c:about :store ; c:situationType d:STOCK ; c:sign "=" ; c:amount 0.0'
+    none, one = (
+        f":order.with{n} a owl:NamedIndividual, {old.replace(' ; c:weight 8.0', '').replace('0.0', f'{n}.0')} ."
+        for n in (0, 9)
+    )
+    either = "c:AnyOf ; c:weight 0.5 ; c:alternative :order.with0, :order.with9 ."
+    either += f"\n{none}\n{one}\n:order.rest a owl:NamedIndividual"
+    result = confab.load(written(tmp_path, old, either)).plan()
+    (unmet,) = result.outcome.forgone
+    assert "which means (store STOCK = 0 or store STOCK = 9)" in str(unmet)
+    assert "(store stock exactly 0 or store stock exactly 9)" in str(result.why_not("order order.goal3 true"))
+
+
 def test_all_soft_goals_are_met_if_their_weights_exceed_their_costs(tmp_path: Path) -> None:
     shop = confab.load(written(tmp_path, "c:weight 8.0", "c:weight 500.0"))
     result = shop.plan()
