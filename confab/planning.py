@@ -376,6 +376,8 @@ class Result(metaclass=RightNames):
             except KnowledgeError:  # possibly only the whole scene has an individual of the text
                 if self.part is None:
                     raise
+                told = None
+            if told is None:
                 return self.in_whole_scene().why_not(asked, instead)
             # Plans for other goals come from `replan`, which has checked them.
             own = words[0] in self.problem.domain.behaviors

@@ -188,21 +188,24 @@ class _Causes:
     def chain(self, goal: Claim) -> tuple[list[Claim], Cause]:
         """Return the shortest chain of claims from the given claim to a claim whose cause depends on no other claim.
 
-        If each cause depends on a claim, the chain ends at a claim about an amount whose cause depends only on claims of the
-        chain (a drive needs charge, and only a drive leads to the charger), or is the given claim alone.
+        If each cause depends on a claim, the chain ends at a claim about an amount with a cause that depends only on claims of the
+        chain (a drive needs charge), together with its other causes (charging needs the dock), or is the given claim alone.
         """
         queue: list[tuple[Claim, ...]] = [(goal,)]
         seen = {goal}
         first: tuple[tuple[Claim, ...], Cause] | None = None
         circle: tuple[tuple[Claim, ...], Cause] | None = None
         for chain in queue:  # the loop appends chains to the queue
-            for cause in self.causes(chain[-1], first=len(chain) == 1):
+            causes = self.causes(chain[-1], first=len(chain) == 1)
+            for cause in causes:
                 if not cause.rests_on:
                     return list(chain), cause
                 first = first or ((goal,), cause)
                 amount = self.lowest.quantity(chain[-1].fact.symbol.situation) is not None
                 if circle is None and amount and {*cause.rests_on} <= {*chain}:
-                    circle = chain, cause
+                    every = [cause, *(other for other in causes if other is not cause)][:SHOWN]
+                    terms = tuple(word for one in every for word in one.terms)
+                    circle = chain, Cause(", and ".join(one.text for one in every), terms)
                 for claim in cause.rests_on:
                     if claim not in seen:
                         seen.add(claim)

@@ -331,3 +331,12 @@ def test_the_reason_is_the_bound_that_a_goal_lies_beyond(scene: str, goal: str, 
     outcome = confab.load(scene).plan(goal).outcome
     assert outcome.status is Status.UNSOLVABLE
     assert outcome.reason is not None and reason in outcome.reason.text
+
+
+def test_the_reason_why_an_amount_never_changes_names_every_behaviour_that_could_change_the_amount() -> None:
+    scene = confab.load("canteen-small").with_fact("trolley TROLLEY_AT table1", "trolley BATTERY 0")
+    reason = scene.plan().outcome.reason
+    assert reason is not None
+    assert (
+        "L2_CHARGE requires trolley TROLLEY_AT some Dock, which never holds; so trolley BATTERY 0 always" in reason.text
+    )
