@@ -171,15 +171,15 @@ def planned(task: PlanningTask) -> Found:
 
 
 def in_time(task: PlanningTask, problem: Problem, outcome: Outcome) -> tuple[Outcome, TimedPlan | None]:
-    """Schedule a plan; if a cheapest plan misses deadlines or windows, schedule the plan of the default mode instead."""
+    """Schedule a plan; if it misses deadlines or windows, schedule a plan that is hardly shortened instead."""
     shorten, left = task.options.minimise == "makespan", task.deadline.left
-    cheapest = task.options.strategy == "optimal" and outcome.plan is not None
-    half = Deadline.after(left / 2) if cheapest and left is not None else task.deadline
+    half = task.deadline if left is None else Deadline.after(left / 2)
     found, timed = scheduled(problem, outcome, half, shorten)
-    if timed is None and cheapest:
-        other = search(task, problem, Searching(DEFAULT_MODE))
-        dearer, timed = scheduled(problem, other, task.deadline, shorten)
-        found = found if timed is None else replace(dearer, bound=outcome.bound)
+    if timed is None and outcome.plan is not None:
+        mode = task.options.strategy
+        other = search(task, problem, Searching(DEFAULT_MODE if mode == "optimal" else mode, brief=True))
+        longer, timed = scheduled(problem, other, task.deadline, shorten)
+        found = found if timed is None else replace(longer, bound=outcome.bound)
     return found, timed
 
 

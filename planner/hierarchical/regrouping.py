@@ -2,8 +2,8 @@
 
 A run is a sequence of consecutive steps between two positions at which all changed symbols that the upper level doesn't see are at
 rest. If no single upper-level step has the effect of a run, the run becomes the joint refinement of several steps
-(docs/levels.md). Each of these upper-level steps takes place during the run: in some state of the run, all facts that the step
-makes true hold.
+(docs/levels.md). Each of these upper-level steps takes place during the run: it is applicable while the run makes its changes, and
+in some state of the run, all facts that the step makes true hold.
 
 The function `grouped` first finds an upper-level step for each run (`runs_of_one_step`). While steps stay ungrouped, it takes
 longer and longer runs, and searches for several upper-level steps (`joint_steps`). Finally, it chooses runs that leave as few steps
@@ -12,10 +12,11 @@ ungrouped as possible (`best_division`).
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from heapq import heappop, heappush
-from itertools import product
+from itertools import pairwise, product
 from math import prod
 from typing import TypeAlias
 
@@ -76,7 +77,7 @@ def grouped(views: _Views) -> list[Step]:
         for run in zip(points, (*points[span:], *points[-1:] * span), strict=False):
             if run not in groups and not ungrouped.isdisjoint(range(*run)):
                 found, work = joint_steps(views, run, work)
-                if found:
+                if found and each_takes_place(views, run, found):
                     groups[run] = found
         division, span = best_division(groups, end), 2 * span
     return [node(views, run, groups[run]) if run in groups else views.steps[run[0]] for run in division]
@@ -141,16 +142,18 @@ def runs_of_one_step(views: _Views) -> dict[StepRange, list[Ground]]:
 def joint_steps(views: _Views, run: StepRange, work: int) -> tuple[list[Ground], int]:
     """Return upper-level steps that together have the effect of a run, and the remaining work.
 
-    The best-first search prefers states with few wrong values. Among these, it prefers states whose new facts hold early in the
-    run. If the search fails, return no steps.
+    The depth-first search follows the run: the new facts of each step hold where the new facts of the step before hold, or later.
+    Steps whose new facts hold early come first. If the search fails, return no steps.
     """
-    course, tried = views.at[run[0] : run[1] + 1], candidates(views, run)
+    course, tried = views.course_of(run), candidates(views, run)
     first, last = course[0], course[-1]
-    holding_at: dict[frozenset[tuple[int, str]], int | None] = {}  # the first position at which new facts hold together
+    holding_at: dict[
+        frozenset[tuple[int, str]], list[int]
+    ] = {}  # the numbers of primitives after which new facts hold together
     before: dict[LevelView, tuple[LevelView, Ground]] = {}
     waiting = [(0, 0, 0, first)]
     while waiting and work > 0 and last not in before:
-        *_, state = heappop(waiting)
+        minus_depth, position, _, state = heappop(waiting)
         views.enter(run[0], state)
         work -= len(tried)
         for step, after in views.successors(tried):
@@ -159,12 +162,11 @@ def joint_steps(views: _Views, run: StepRange, work: int) -> tuple[list[Ground],
             new = views.new_facts(state, after)
             if new not in holding_at:
                 work -= len(course)
-                holding = (at for at, view in enumerate(course) if all(view[i] == value for i, value in new))
-                holding_at[new] = next(holding, None)
-            if (at := holding_at[new]) is not None:
+                holding_at[new] = [at for at, view in enumerate(course) if all(view[i] == value for i, value in new)]
+            later = bisect_left(holding_at[new], position)
+            if later < len(holding_at[new]):
                 before[after] = state, step
-                wrong = sum(value != wanted for value, wanted in zip(after, last, strict=True))
-                heappush(waiting, (wrong, at, len(before), after))
+                heappush(waiting, (minus_depth - 1, holding_at[new][later], len(before), after))
     found, state = list[Ground](), last
     while state in before:
         state, step = before[state]
@@ -182,11 +184,42 @@ def without_needless(views: _Views, run: StepRange, steps: list[Ground], work: i
     return steps, work
 
 
+def each_takes_place(views: _Views, run: StepRange, steps: Sequence[Ground]) -> bool:
+    """Return whether each of several upper-level steps is applicable while the primitives of a run make its changes.
+
+    A step begins at the first change of one of its symbols after the earlier steps with the same symbol have ended. It ends when
+    all facts that it makes true hold. In some state in between, the step has to be applicable if its own symbols still have their
+    values from the begin. A symbol whose value the upper level doesn't see counts with this value, or with its last visible value.
+    """
+    begin, end = views.primitives[run[0]], views.primitives[run[1]]
+    course, ended = views.course, dict[int, int]()
+    visible = {begin: course[begin]}
+    for p in range(begin, end):
+        visible[p + 1] = tuple(now or before for now, before in zip(course[p + 1], visible[p], strict=True))
+    view = course[begin]
+    for step in steps:
+        views.enter(run[0], view)
+        after = next((after for _, after in views.successors([step])), view)
+        own = {i for i, _ in views.new_facts(view, after)}
+        since = max((ended.get(i, begin) for i in own), default=begin)
+        first = next((p for p in range(since, end) if any(course[p][i] != course[p + 1][i] for i in own)), end)
+        last = next((p for p in range(first + 1, end) if all(course[p][i] == after[i] for i in own)), end)
+        if own and not any(
+            views.applicable(p, tuple(visible[first][i] if i in own else v for i, v in enumerate(now)), step)
+            for p in range(first, last)
+            for now in (course[p], visible[p])
+        ):
+            return False
+        ended.update(dict.fromkeys(own, last))
+        view = after
+    return True
+
+
 def candidates(views: _Views, run: StepRange) -> list[Ground]:
     """Return the upper-level steps that could make one of the facts true that become true during a run."""
-    problem, (begin, end) = views.call.problem, run
+    problem, course = views.call.problem, views.course_of(run)
     facts = dict[tuple[Cell, str], None]()
-    for before, after in zip(views.at[begin:end], views.at[begin + 1 : end + 1], strict=True):
+    for before, after in pairwise(course):
         if before != after:
             facts.update(((cell, after[i]), None) for cell, i in views.place.items() if before[i] != after[i])
     found = dict[Ground, None]()
@@ -197,27 +230,30 @@ def candidates(views: _Views, run: StepRange) -> list[Ground]:
 
 
 def instances(problem: Problem, behavior: Behavior, cell: Cell, value: str) -> Iterator[Ground]:
-    """Yield the instances of a behaviour whose most specific effect could give a value to a symbol."""
+    """Yield the instances of a behaviour whose most specific effect could give a value to a symbol.
+
+    If all effects are conditional, yield the instances with any effect that could do so.
+    """
     names = {p.name for p in behavior.parameters}
-    effect = max(
-        (effect for effect in behavior.every_effect if not effect.when),
-        key=lambda effect: len(names & {*effect.arguments, getattr(effect, "value", "")}),
-        default=None,
-    )
-    if effect is None or effect.situation != cell[0]:
-        return
-    pairs = [*zip(effect.arguments, arguments_of(cell[1]), strict=True)]
-    pairs += [(effect.value, value)] if isinstance(effect, ValueEffect) else []
-    terms: dict[str, str] = {}
-    for term, individual in pairs:
-        if terms.setdefault(term, individual) != individual or (term not in behavior.kinds and term != individual):
-            return
-    members = problem.members
-    choices = [[terms[p.name]] if p.name in terms else sorted(members(p.kind)) for p in behavior.parameters]
-    if prod(map(len, choices)) <= MOST_FILLED:
-        for arguments in product(*choices):
-            if all(one in members(p.kind) for one, p in zip(arguments, behavior.parameters, strict=True)):
-                yield behavior.name, arguments
+    always = [effect for effect in behavior.every_effect if not effect.when]
+    always.sort(key=lambda effect: len(names & {*effect.arguments, getattr(effect, "value", "")}), reverse=True)
+    for effect in always[:1] or behavior.every_effect:
+        if effect.situation != cell[0]:
+            continue
+        pairs = [*zip(effect.arguments, arguments_of(cell[1]), strict=True)]
+        pairs += [(effect.value, value)] if isinstance(effect, ValueEffect) else []
+        terms: dict[str, str] = {}
+        if any(
+            terms.setdefault(term, individual) != individual or (term not in behavior.kinds and term != individual)
+            for term, individual in pairs
+        ):
+            continue
+        members = problem.members
+        choices = [[terms[p.name]] if p.name in terms else sorted(members(p.kind)) for p in behavior.parameters]
+        if prod(map(len, choices)) <= MOST_FILLED:
+            for arguments in product(*choices):
+                if all(one in members(p.kind) for one, p in zip(arguments, behavior.parameters, strict=True)):
+                    yield behavior.name, arguments
 
 
 # ------------------------------------------------------------------------------------------------------------- the states
@@ -226,27 +262,31 @@ def instances(problem: Problem, behavior: Behavior, cell: Cell, value: str) -> I
 class _Views:
     """The states before and after some steps, as the level above the steps sees them.
 
-    `at` contains the view at each position, and `place` the place of each changed symbol in a view. At the positions in `resting`,
-    all changed symbols that the level doesn't see are at rest.
+    `course` contains the view after each number of primitives, and `at` the view at each position; `primitives` contains the number
+    of primitives before each position, and `place` the place of each changed symbol in a view. At the positions in `resting`, all
+    changed symbols that the level doesn't see are at rest.
     """
 
     def __init__(self, call: Call, steps: Sequence[Step], level: int) -> None:
         self.call, self.steps, self.level = call, steps, level
-        self.resting = [0]
-        self._values: list[dict[Cell, str]] = [{}]  # the values that differ from the initial state, at each position
+        self.resting, self.primitives = [0], [0]
+        self._values: list[dict[Cell, str]] = [
+            {}
+        ]  # the values that differ from the initial state, after each primitive
         touched = self._apply_all()
         situations = call.problem.domain.situations
         self.place = {cell: i for i, cell in enumerate(cell for cell in touched if call.space.visible(level, cell))}
         self._amounts = {i for cell, i in self.place.items() if situations[cell[0]].quantity is not None}
-        self.at: list[LevelView] = []
+        self.course: list[LevelView] = []
         for values in self._values:
             call.table.undo(0)
             call.table.put_all(values)
-            self.at.append(self._now())
+            self.course.append(self._now())
+        self.at = [self.course[number] for number in self.primitives]
         call.table.undo(0)
 
     def _apply_all(self) -> dict[Cell, None]:
-        """Apply the primitives of all steps, record the states between the steps, and return the changed symbols."""
+        """Apply the primitives of all steps, record the states between them, and return the changed symbols."""
         table, space = self.call.table, self.call.space
         situations = self.call.problem.domain.situations
         touched, restless = dict[Cell, None](), set[Cell]()
@@ -258,15 +298,20 @@ class _Views:
                 done = space.forward[one.behavior](*one.arguments)
                 if done is not None:
                     space.apply(done[1])
+                self._values.append(table.since(0))
             for cell in table.before(mark):
                 touched[cell] = None
                 if situations[cell[0]].level > self.level and cell[0] in space.rest:
                     rests = table.now[cell[0]][cell[1]] == space.rest[cell[0]]
                     (restless.discard if rests else restless.add)(cell)
-            self._values.append(table.since(0))
+            self.primitives.append(len(self._values) - 1)
             if not restless:
                 self.resting.append(position)
         return touched
+
+    def course_of(self, run: StepRange) -> Sequence[LevelView]:
+        """Return the views after each number of primitives of a run."""
+        return self.course[self.primitives[run[0]] : self.primitives[run[1]] + 1]
 
     def changing_positions(self) -> list[int]:
         """Return the positions at rest whose view differs from the previous one, with the first and the last position."""
@@ -280,11 +325,19 @@ class _Views:
 
     def enter(self, position: int, view: LevelView | None = None) -> None:
         """Bring the table to the state at a position; the level then sees the values of `view`, if given."""
-        table, there = self.call.table, self.at[position]
+        self._put(self.primitives[position], self.at[position] if view is None else view)
+
+    def _put(self, number: int, view: LevelView) -> None:
+        table, there = self.call.table, self.course[number]
         table.undo(0)
-        table.put_all(self._values[position])
-        if view is not None and view != there:
+        table.put_all(self._values[number])
+        if view != there:
             table.put_all({cell: view[i] for cell, i in self.place.items() if view[i] != there[i]})
+
+    def applicable(self, number: int, view: LevelView, step: Ground) -> bool:
+        """Return whether an upper-level step is applicable after a number of primitives if the level sees the values of `view`."""
+        self._put(number, view)
+        return self.call.space.forward[step[0]](*step[1]) is not None
 
     def successors(self, steps: Iterable[Ground]) -> Iterator[tuple[Ground, LevelView]]:
         """Yield the upper-level steps that are applicable in the table, each with the view afterwards.

@@ -17,7 +17,7 @@ from confab.planner.hierarchical.inherited_preconditions import binding
 from confab.planner.hierarchical.refinement import RefinedStep
 from confab.planner.hierarchical.workspace import Ground
 from confab.planner.levels import levels_left
-from confab.planner.plan import Plan, Step, UngroundableError, renumbered, separated
+from confab.planner.plan import Plan, Step, UngroundableError
 from confab.planner.plan_costs import compared
 from confab.planner.validation import validate
 from confab.reasoner.symbols import Problem
@@ -150,9 +150,5 @@ def improves(problem: Problem, new: Plan, old: Plan, level: int) -> bool:
 
 
 def broken(problem: Problem, plan: Plan) -> int:
-    """Return the number of changes of a plan that violate a condition of an upper level.
-
-    A change in the joint refinement of several steps also violates a condition if no single behaviour of their level could make
-    the change.
-    """
-    return sum(len(left.broken) for left in levels_left(problem, Plan(renumbered(separated(plan.steps)))))
+    """Return the number of changes of a plan that violate a condition of an upper level."""
+    return sum(len(left.broken) for left in levels_left(problem, plan))

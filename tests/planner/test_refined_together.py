@@ -14,6 +14,38 @@ from confab.planner.solve import Mode
 from confab.planner.validation import validate
 from confab.reasoner.symbols import Fact, Symbol
 
+LAUNDRY = """
+@prefix : <https://example.org/laundry#> .
+@prefix c: <https://w3id.org/confab/core#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+<https://example.org/laundry> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> ; c:symbolicOnly true .
+:Cloth a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object ; c:hasSituationType :IN, :CLEAN .
+:Place a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object, :IN .
+:Shelf a owl:Class, owl:NamedIndividual ; rdfs:subClassOf :Place .
+:Washer a owl:Class, owl:NamedIndividual ; rdfs:subClassOf :Place .
+:IN a owl:Class, owl:NamedIndividual, c:SituationType ; c:valueProperty :in .
+:in a owl:ObjectProperty, owl:FunctionalProperty, owl:NamedIndividual ; rdfs:domain :Cloth ; rdfs:range :IN .
+:CLEAN a owl:Class, owl:NamedIndividual, c:SituationType .
+:L1_CLEAN a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 1 ; c:update '''
+  DELETE { ?cloth :in ?from } INSERT { ?cloth :in ?shelf ; :CLEAN true }
+  WHERE { ?cloth a :Cloth . ?shelf a :Shelf . ?cloth :in ?from ; :CLEAN false }''' .
+:L2_CARRY a owl:NamedIndividual, c:Behavior ; c:level 2 ; c:index 1 ; c:update '''
+  DELETE { ?cloth :in ?from } INSERT { ?cloth :in ?to }
+  WHERE { ?cloth a :Cloth . ?to a :Place . ?cloth :in ?from FILTER(?from != ?to) }''' .
+:L2_WASH a owl:NamedIndividual, c:Behavior ; c:level 2 ; c:index 2 ; c:cost 5 ; c:update '''
+  INSERT { :Cloth :CLEAN true } WHERE { ?washer a :Washer . :Cloth :in ?washer }''' .
+:floor a :Place, owl:NamedIndividual . :shelf a :Shelf, owl:NamedIndividual . :washer a :Washer, owl:NamedIndividual .
+:shirt a :Cloth, owl:NamedIndividual ; :in :floor . :sock a :Cloth, owl:NamedIndividual ; :in :floor .
+[] a owl:AllDifferent ; owl:distinctMembers ( :floor :shelf :washer :shirt :sock ) .
+:task a owl:NamedIndividual, c:Task ; c:goal :shirt.clean, :sock.clean, :shirt.in, :sock.in .
+:shirt.clean a owl:NamedIndividual, c:ValueCondition ; c:situationType :CLEAN ; c:about :shirt .
+:sock.clean a owl:NamedIndividual, c:ValueCondition ; c:situationType :CLEAN ; c:about :sock .
+:shirt.in a owl:NamedIndividual, c:ValueCondition ; c:situationType :IN ; c:about :shirt ; c:value :shelf .
+:sock.in a owl:NamedIndividual, c:ValueCondition ; c:situationType :IN ; c:about :sock ; c:value :shelf .
+"""
+"""Cloth is washed in a machine, which is a place that level 1 sees."""
+
 
 @cache
 def library() -> confab.Scene:
@@ -132,8 +164,27 @@ def test_a_large_library_needs_no_more_tours_than_the_capacity_of_the_cart_requi
     assert plan.length[2] <= 45
 
 
-@pytest.mark.parametrize(("scene", "most"), [("centrifuge", 15), ("two-tables", 26)])
+@pytest.mark.parametrize(("scene", "most"), [("centrifuge", 15), ("two-tables", 26), ("three-cups", 18)])
 def test_a_change_that_each_refinement_would_undo_is_made_once_for_several_steps(scene: str, most: int) -> None:
     plan = confab.load(scene).plan().plan
     assert len(plan.primitives) <= most
     assert any(step.joined for step in plan.steps)
+
+
+def test_things_that_one_step_of_a_lower_level_washes_together_are_cleaned_by_steps_refined_together(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "laundry.ttl").write_text(LAUNDRY, "utf-8")
+    plan = confab.load(tmp_path / "laundry.ttl").plan().plan
+    assert plan.length == {1: 2, 2: 5}
+    (node,) = plan.steps
+    assert [step.behavior for step in node.together] == ["L1_CLEAN", "L1_CLEAN"]
+
+
+def test_a_cup_is_not_filled_before_it_is_moved_where_level_1_moves_no_filled_cup() -> None:
+    scene = confab.load("beverage-serving")
+    plan = scene.plan(["cup1 LOCATION location7", "cup1 BEVERAGE beverage1"]).plan
+    moved, filled = (
+        next(i for i, s in enumerate(plan.primitives) if s.behavior == name) for name in ("B3_PUT_DOWN", "B3_TILT")
+    )
+    assert moved < filled
