@@ -480,15 +480,6 @@ def changed(before: State, after: State) -> list[Fact]:
     return sorted(Fact(symbol, value) for symbol, value in after.items() if before.get(symbol) != value)
 
 
-def separated(steps: Iterable[Step]) -> Iterator[Step]:
-    """Yield the given steps; steps that are refined together are replaced by their common sub-steps, with unchanged paths."""
-    for step in steps:
-        if step.joined:
-            yield from separated(step.steps)
-        else:
-            yield replace(step, steps=tuple(separated(step.steps)))
-
-
 def renumbered(steps: Iterable[Step], first: int = 0, above: tuple[int, ...] = ()) -> tuple[Step, ...]:
     """Return steps with new paths; the first step below the path `above` has the number `first`."""
     return tuple(
