@@ -135,7 +135,10 @@ def shared(problem: Problem, plan: Plan, until: float | None, shorten: bool = Tr
 
 
 def crews_of(problem: Problem) -> Iterator[Crew]:
-    """Yield the crews of a problem; the first crew allows all individuals."""
+    """Yield the crews of a problem; the first crew allows all individuals.
+
+    No individual is chosen for a class that contains another class of actors, such as machines for washers and dryers.
+    """
     resting = default_actors(problem)
     kinds = dict.fromkeys(
         behavior.kinds[term]
@@ -143,7 +146,10 @@ def crews_of(problem: Problem) -> Iterator[Crew]:
         for term in _actor_terms(problem, behavior, resting)
     )
     classes = {kind: problem.classes.get(kind, ()) for kind in kinds}
-    several = {kind: its for kind, its in classes.items() if len(its) > 1}
+    general = {
+        kind for kind, its in classes.items() if any(set(other) < set(its) for other in classes.values() if other)
+    }
+    several = {kind: its for kind, its in classes.items() if len(its) > 1 and kind not in general}
     yield Crew()
     for its in product(*several.values()) if several else ():
         yield Crew(tuple(zip(several, its, strict=True)))

@@ -15,6 +15,7 @@ import confab.timing
 from confab.cli import app
 from confab.planner.plan import Outcome, Status
 from confab.planner.timed.plan import TimedPlan
+from confab.planner.timed.sharing import crews_of
 from confab.planning import Result
 from confab.reasoner.symbols import Problem
 from confab.timing import Minimise
@@ -156,6 +157,23 @@ def test_quick_steps_are_chosen_for_deadlines_that_cheap_steps_miss(
     result = planned(tmp_path, {"r1": "hall"}, {"a": 15, "b": 30, "c": 90}, minimise=minimise)
     assert result.timed is not None
     assert {"GO", "FLY"} >= {step.behavior for step in result.plan.primitives} - {"WASH"} >= {"FLY"}
+
+
+def test_no_actor_is_chosen_for_a_class_that_contains_another_class_of_actors(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rest = """
+:Machine a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object ; c:hasSituationType :RESTED .
+:Robot rdfs:subClassOf :Machine . :Charger rdfs:subClassOf :Machine .
+:RESTED a owl:Class, owl:NamedIndividual, c:SituationType .
+:REST a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 4 ; c:actor :REST.machine ; c:update \"\"\"
+  INSERT { ?machine :RESTED true } WHERE { ?machine a :Machine . ?machine :RESTED false }\"\"\" .
+:REST.machine a owl:NamedIndividual .
+"""
+    monkeypatch.setattr(f"{__name__}.ROBOTS", ROBOTS + rest)
+    result = planned(tmp_path, {"r1": "hall", "r2": "hall"}, {"a": None}, chargers={"c1": "hall", "c2": "hall"})
+    crews = [[actor for _, actor in crew.chosen] for crew in crews_of(result.scene.problem)]
+    assert crews == [[], ["r1", "c1"], ["r1", "c2"], ["r2", "c1"], ["r2", "c2"]]
 
 
 def test_the_default_plan_is_kept_if_a_cheapest_plan_misses_its_deadlines(
