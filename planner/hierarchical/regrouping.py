@@ -147,9 +147,7 @@ def joint_steps(views: _Views, run: StepRange, work: int) -> tuple[list[Ground],
     """
     course, tried = views.course_of(run), candidates(views, run)
     first, last = course[0], course[-1]
-    holding_at: dict[
-        frozenset[tuple[int, str]], list[int]
-    ] = {}  # the numbers of primitives after which new facts hold together
+    holding_at: dict[frozenset[tuple[int, str]], list[int]] = {}  # after how many primitives new facts hold together
     before: dict[LevelView, tuple[LevelView, Ground]] = {}
     waiting = [(0, 0, 0, first)]
     while waiting and work > 0 and last not in before:
