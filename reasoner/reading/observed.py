@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 
 import pyoxigraph as ox
 
 from confab.reasoner.aggregates.totals import following
+from confab.reasoner.amounts import written
 from confab.reasoner.condition_nodes import symbol_properties, triples
 from confab.reasoner.files import write_whole
 from confab.reasoner.graph.knowledge import BASE, KnowledgeError, KnowledgeGraph, read_into, text
@@ -66,7 +68,11 @@ def load_observed(path: Path, reading: Reading) -> Reading:
     read_into(graph, path, "observed")
     nodes: dict[str, dict[str, str]] = {}
     for fact, predicate, value in graph.select(FACTS):
-        nodes.setdefault(text(fact), {})[text(predicate).removeprefix(CORE)] = reading.names.short(text(value))
+        word, said = text(predicate).removeprefix(CORE), text(value)
+        if word == "amount":
+            nodes.setdefault(text(fact), {})["value"] = _amount(said, path)
+        else:
+            nodes.setdefault(text(fact), {})[word] = reading.names.short(said)
     if not nodes:
         raise KnowledgeError(f"{path}: holds no observed facts; 'confab run' and 'confab execute' write such a file")
     seen: dict[Symbol, str] = {}
@@ -99,6 +105,13 @@ def _symbol(iri: str, node: Mapping[str, str], known: State, path: Path) -> Symb
     return symbol
 
 
+def _amount(number: str, path: Path) -> str:
+    try:
+        return written(Fraction(number))
+    except (ValueError, ZeroDivisionError) as error:
+        raise KnowledgeError(f"{path}: the amount '{number}' is no number; observe this scene again") from error
+
+
 def _triples(state: State, names: Names, scene: str) -> list[ox.Triple]:
     iri, owl, kind = observed_iri(scene), OWL, ox.NamedNode(TYPE)
     found = [
@@ -109,6 +122,8 @@ def _triples(state: State, names: Names, scene: str) -> list[ox.Triple]:
         local = ".".join((*symbol.arguments[:1], symbol.situation, *symbol.arguments[1:])).replace(":", "-")
         fact = ox.NamedNode(f"{iri}#{local}")
         arguments = [*map(names.iri, symbol.arguments)]
-        properties = symbol_properties(names.iri(symbol.situation), arguments, names.iri(value))
+        known = names.iri(value) if value in names else None
+        amount = {"amount": [value]} if known is None else {}
+        properties = {**symbol_properties(names.iri(symbol.situation), arguments, known), **amount}
         found += triples(fact, {TYPE: [INDIVIDUAL, CORE + "SituatedObjectInstance"], **properties})
     return found

@@ -24,6 +24,16 @@ def test_an_observed_value_replaces_the_value_of_the_scene(tmp_path: Path) -> No
     assert replace(seen.problem, initial={**seen.problem.initial, CUP2: "location1"}) == reading.problem
 
 
+def test_an_observed_amount_replaces_the_amount_of_the_scene(tmp_path: Path) -> None:
+    graph, servings = load("three-cups"), Symbol("SERVINGS", ("bottle1",))
+    reading, file = read(graph), tmp_path / "observed.ttl"
+    save_observed(file, {servings: "2"}, reading.names, graph.scene)
+    assert load_observed(file, reading).problem.initial[servings] == "2"
+    file.write_text(file.read_text().replace('amount "2"', 'amount "some"'))
+    with pytest.raises(KnowledgeError, match="the amount 'some' is no number"):
+        load_observed(file, reading)
+
+
 def test_the_graph_has_the_observed_places_and_the_scene_keeps_its_own() -> None:
     graph = load("beverage-serving")
     reading = read(graph)
