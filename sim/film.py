@@ -309,13 +309,22 @@ def _meets(box: tuple[float, float, float, float], others: Sequence[tuple[float,
 
 
 def _write_row(draw: ImageDraw.ImageDraw, texts: Sequence[str], width: int, y: float) -> None:
-    """Write texts side by side in the largest font size that fits, and the last text in a dark colour."""
-    gap = 26
+    """Write texts side by side in the largest font size that fits, and the last text in a dark colour.
+
+    If no size fits, the longest text before the last one is shortened.
+    """
+    gap, texts = 26, list(texts)
     for size in SIZES:
         font = ImageFont.load_default(size)
         lengths = [draw.textlength(text, font=font) for text in texts]
         if sum(lengths) + gap * len(texts) < width:
             break
+    while len(texts) > 1 and sum(lengths) + gap * len(texts) >= width:
+        longest = max(range(len(texts) - 1), key=lambda number: lengths[number])
+        if len(texts[longest]) < 2:
+            break
+        texts[longest] = texts[longest].rstrip("…")[:-1] + "…"
+        lengths[longest] = draw.textlength(texts[longest], font=font)
     x = 14.0
     for text, length in zip(texts, lengths, strict=True):
         own = text is texts[-1]

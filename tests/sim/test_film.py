@@ -5,10 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image, ImageDraw
 
 import confab
 from confab.sim.faults import stranger
-from confab.sim.film import BAR, Film, _points, _visible
+from confab.sim.film import BAR, Film, _points, _visible, _write_row
 from confab.sim.picture import view_of
 from confab.sim.world import PhysicsWorld
 
@@ -60,3 +61,11 @@ def test_the_camera_turns_to_a_side_on_which_the_handle_is_visible(world: Physic
     assert film.camera is not None
     assert not _visible(world, first, handle, "drawer")
     assert _visible(world, film.camera, handle, "drawer")
+
+
+def test_the_caption_of_a_film_shows_the_primitive_after_long_names_of_steps() -> None:
+    blank = Image.new("RGB", (960, 40), "white")
+    _write_row(ImageDraw.Draw(blank), ["pour bottle 1 to cup 1; " * 9, "pour to cup 1", "tilt left hand"], 960, 10)
+    pixels = np.asarray(blank)
+    dark = np.argwhere((pixels < 90).all(axis=2))
+    assert 800 < dark[:, 1].min() < dark[:, 1].max() < 950
