@@ -15,6 +15,7 @@ from confab.planner.plan import Step
 from confab.planner.validation import successor
 from confab.reasoner.aggregates.totals import following
 from confab.reasoner.amounts import DECIMAL
+from confab.reasoner.possible import PLACE
 from confab.reasoner.refutations import Refutation, with_refuted
 from confab.reasoner.symbols import (
     FALSE,
@@ -26,11 +27,15 @@ from confab.reasoner.symbols import (
     Fact,
     Parameter,
     Problem,
+    SituationType,
     State,
     Symbol,
     ValueCondition,
     ValueEffect,
 )
+
+UNSEEN = "not seen"
+"""The value of a symbol of which no value is perceived; no individual has this name."""
 
 
 @dataclass
@@ -56,6 +61,22 @@ class Belief:
     def using(self) -> Compiled:
         """The compiled domain; it is compiled at its first use, so that the time counts towards an episode's time limit."""
         return compiled(self.problem)
+
+    @property
+    def task(self) -> Problem:
+        """The problem from which steps are planned.
+
+        A symbol that had a value at first, and of which no value is perceived, has the value `UNSEEN`. So a behaviour can give it a
+        value again, such as lifting a hand that was stopped on its way. Excepted are places, and individuals that have vanished.
+        """
+        initial, situations = self.problem.initial, self.problem.domain.situations
+        there = {symbol.arguments[0] for symbol in initial if symbol.arguments}
+        lost = {
+            symbol: UNSEEN
+            for symbol in self.certain.initial.keys() - initial.keys()
+            if symbol.arguments[0] in there and _has_named_values(situations[symbol.situation])
+        }
+        return replace(self.problem, initial={**initial, **dict(sorted(lost.items()))}) if lost else self.problem
 
     @property
     def state(self) -> dict[Symbol, str]:
@@ -146,7 +167,7 @@ class Belief:
 
     def without_obstacles(self, goal: Mapping[Symbol, str]) -> Problem:
         """Return the task of reaching a goal, with every obstacle treated as movable."""
-        return replace(self.problem, domain=self.unobstructed, relations=self.certain.relations, goal=dict(goal))
+        return replace(self.task, domain=self.unobstructed, relations=self.certain.relations, goal=dict(goal))
 
     # ------------------------------------------------------------------------------------------------- doubts
 
@@ -166,6 +187,12 @@ class Belief:
         known = replace(self.problem, relations=self.certain.relations, domain=self.certain.domain)
         self.problem = with_refuted(without_relations(known, self.withdrawn), self.refuted)
         self.using = compiled(self.problem)
+
+
+def _has_named_values(situation: SituationType) -> bool:
+    """Return whether a situation type has values other than numbers, truth values and places."""
+    placed = situation.perceived is not None and situation.perceived.by == PLACE
+    return not (situation.boolean or situation.quantity or placed)
 
 
 def _with_obstacle(problem: Problem, individual: str) -> Problem:

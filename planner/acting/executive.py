@@ -20,7 +20,7 @@ from dataclasses import dataclass, field, replace
 from time import perf_counter
 
 from confab.planner.acting.agenda import Postponed, RemainingSteps, ReplanRequest
-from confab.planner.acting.belief import Belief
+from confab.planner.acting.belief import UNSEEN, Belief
 from confab.planner.acting.episode import (
     End,
     Episode,
@@ -218,8 +218,9 @@ class _RunningEpisode:
 
         Return None if the precondition of the primitive doesn't hold.
         """
-        step, problem = first_chain(self.agenda.steps)[-1], self.belief.problem
-        return successor(problem, problem.domain.behaviors[step.behavior], step.arguments, problem.initial)
+        step, problem = first_chain(self.agenda.steps)[-1], self.belief.task
+        after = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, problem.initial)
+        return after and {symbol: value for symbol, value in after.items() if value != UNSEEN}
 
     def perform(self, expected: dict[Symbol, str]) -> tuple[tuple[Step, ...], State, Verdict]:
         """Execute the next primitive and observe; a failed primitive counts as done if its effects are observed.
@@ -414,15 +415,15 @@ class _RunningEpisode:
             planned = replace(self.agenda.planned_for, initial=expected)
             begun = bool(old) and old[0].path in self.agenda.begun
             repaired = repair_or_replan(
-                belief.problem, old, planned, self.planner, belief.using, self.agenda.sound, limits, begun
+                belief.task, old, planned, self.planner, belief.using, self.agenda.sound, limits, begun
             )
             kind, steps, cost, outcome = repaired.kind, repaired.steps, repaired.cost, repaired.outcome
         else:
-            steps, outcome = replan(belief.problem, self.planner, belief.using, limits)
+            steps, outcome = replan(belief.task, self.planner, belief.using, limits)
             kind, cost = "replan", float(len(Plan(steps or ()).primitives))
         seconds = perf_counter() - begin
         record.seconds["repairing"] += seconds
-        self.agenda.planned_for, self.agenda.sound, self.request.missed = belief.problem, True, {}
+        self.agenda.planned_for, self.agenda.sound, self.request.missed = belief.task, True, {}
         if steps is None:
             self.on_no_plan(outcome, limits.until(end))
             return
@@ -464,7 +465,7 @@ class _RunningEpisode:
             return
         hopeless: dict[Symbol, Reason] = {}
         for fact in open_goals(belief.problem) if unsolvable else ():
-            alone = replace(belief.problem, goal={fact.symbol: fact.value})
+            alone = replace(belief.task, goal={fact.symbol: fact.value})
             steps, single = replan(alone, None, belief.using, limits.until(end))
             if steps is None and single.status is Status.UNSOLVABLE and single.reason is not None:
                 hopeless[fact.symbol] = blocked(belief, fact, limits.until(end)) or with_discoveries(

@@ -243,6 +243,28 @@ def test_a_primitive_without_a_path_is_executed_after_the_obstacle_has_moved() -
     assert {one.facts for one in episode.refuted} == {(there,)}
 
 
+def test_a_hand_that_was_stopped_on_its_way_and_has_no_perceived_position_is_lifted() -> None:
+    position = Symbol("HAND_POSITION", ("left_hand",))
+
+    class Stopping(SymbolicWorld):
+        stops, lost = 2, False
+
+        def execute(self, step: Step) -> WorldReport:
+            self.lost = step.behavior == "B3_LIFT" and self.stops > 0
+            self.stops -= self.lost
+            return WorldReport(False, "tracking error") if self.lost else super().execute(step)
+
+        def observe(self) -> State:
+            return {symbol: value for symbol, value in self.state.items() if not (self.lost and symbol == position)}
+
+    episode = act(serving(), Stopping(serving()), planned())
+    assert episode.status is End.REACHED
+    assert [failure.code for failure in episode.failures] == ["tracking error"] * 2
+    assert None in {seen.value for seen in episode.course if seen.symbol == position}
+    assert len(episode.events) == 32 + 2
+    assert not episode.replans
+
+
 def test_a_primitive_that_failed_once_is_repeated() -> None:
     tries = iter([True])
     episode = failing(lambda step, state: step.behavior == "B3_GRASP" and next(tries, False), "no grasp")
