@@ -178,8 +178,9 @@ def in_time(task: PlanningTask, problem: Problem, outcome: Outcome) -> tuple[Out
     if timed is None and outcome.plan is not None:
         mode = task.options.strategy
         other = search(task, problem, Searching(DEFAULT_MODE if mode == "optimal" else mode, brief=True))
-        longer, timed = scheduled(problem, other, task.deadline, shorten)
-        found = found if timed is None else replace(longer, bound=outcome.bound)
+        if other.plan is not None and other.plan.primitives != outcome.plan.primitives:
+            longer, timed = scheduled(problem, other, task.deadline, shorten)
+            found = found if timed is None else replace(longer, bound=outcome.bound)
     return found, timed
 
 

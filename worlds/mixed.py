@@ -84,16 +84,9 @@ class RandomWorld:
     updates: frozenset[str] = frozenset()
 
 
-def mixed(
-    seed: int,
-    aggregated: float = AGGREGATED,
-    constrained: float = 0.0,
-    remembered: float = 0.0,
-    mutual: float = 0.0,
-    priced: float = 0.0,
-) -> RandomWorld:
+def mixed(seed: int, aggregated: float = AGGREGATED, **shares: float) -> RandomWorld:
     """Return the random world of a seed; for the other parameters see `drawn`."""
-    return drawn(seed, aggregated, constrained, remembered, mutual, priced)[0]
+    return drawn(seed, aggregated, **shares)[0]
 
 
 def drawn(

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from threading import Timer
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, cast, runtime_checkable
 
 from confab.planner.acting.discovery import Discovery
 from confab.planner.plan import Step
@@ -178,9 +178,8 @@ class Guarded:
         self, problem: Problem, primitives: Sequence[Step], may_begin: Callable[[Set[tuple[int, ...]]], bool]
     ) -> Sequence[tuple[WorkerSlot, Verdict]]:
         """Execute primitives with several actors at once, as `Concurrent.execute_together`."""
-        world: Concurrent = self.world  # type: ignore[assignment]  # the caller knows that the world is concurrent
         with _asking("execute_together()"):
-            return world.execute_together(problem, primitives, may_begin)
+            return cast("Concurrent", self.world).execute_together(problem, primitives, may_begin)
 
     def stop(self) -> None:
         """Stop the running primitive; ignore an error raised by the world's `stop`."""

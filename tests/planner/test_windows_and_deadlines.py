@@ -11,13 +11,14 @@ import pytest
 from click.testing import CliRunner
 
 import confab
+import confab.plan_call
 import confab.timing
 from confab.cli import app
 from confab.planner.plan import Outcome, Status
 from confab.planner.timed.plan import TimedPlan
 from confab.planner.timed.sharing import crews_of
 from confab.planning import Result
-from confab.reasoner.symbols import Problem
+from confab.reasoner.symbols import Problem, Symbol
 from confab.timing import Minimise
 
 ROBOTS = '''
@@ -176,20 +177,26 @@ def test_no_actor_is_chosen_for_a_class_that_contains_another_class_of_actors(
     assert crews == [[], ["r1", "c1"], ["r1", "c2"], ["r2", "c1"], ["r2", "c2"]]
 
 
-def test_the_default_plan_is_kept_if_a_cheapest_plan_misses_its_deadlines(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("longer", [True, False])
+def test_a_longer_plan_is_scheduled_if_a_cheapest_plan_misses_its_deadlines(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, longer: bool
 ) -> None:
-    late = [True]
+    search, plans = confab.plan_call.search, list[int]()
+    more = {Symbol("CLEAN", ("hall",)): "true"} if longer else {}
+
+    def searched(task: Any, problem: Problem, how: confab.plan_call.Searching) -> Outcome:
+        return search(task, replace(problem, goal={**problem.goal, **more}) if how.brief else problem, how)
 
     def scheduled(problem: Problem, outcome: Outcome, *rest: Any) -> tuple[Outcome, TimedPlan | None]:
-        if late:
-            late.clear()
+        plans.append(len(outcome.plan.primitives) if outcome.plan else 0)
+        if len(plans) == 1:
             return replace(outcome, status=Status.GAVE_UP, plan=None), None
         return confab.timing.scheduled(problem, outcome, *rest)
 
+    monkeypatch.setattr("confab.plan_call.search", searched)
     monkeypatch.setattr("confab.plan_call.scheduled", scheduled)
-    result = planned(tmp_path, {"r1": "hall"}, {"a": 15}, minimise="cost")
-    assert result.solved
+    result = planned(tmp_path, {"r1": "hall"}, {"a": 60}, minimise="cost")
+    assert (result.solved, plans) == ((True, [2, 3]) if longer else (False, [2]))
     assert result.outcome.bound == 2
 
 
