@@ -12,7 +12,6 @@ A plan of several levels is a sequence of behaviours of the lowest level that en
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -20,7 +19,7 @@ from itertools import product
 from typing import Generic, TypeAlias, TypeVar
 
 from confab.planner.certificates import Certificate
-from confab.planner.checked_conditions import variables
+from confab.planner.checked_conditions import own_variables, unified
 from confab.planner.possibilities import Beginning, FactEvaluation, Lowest, Range, WorkLimitError
 from confab.reasoner.amounts import bounds, number, written
 from confab.reasoner.symbols import FALSE, TRUE, Behavior, Fact, Problem, Symbol
@@ -358,7 +357,7 @@ class Cases:
                     )
                     if given is None:
                         continue
-                    for env in applicable(known, behavior, given):
+                    for env in known.solutions(self.lowest.asked(behavior), given, behavior.kinds):
                         key = behavior.name, tuple(sorted(env.items()))
                         if key not in seen:
                             seen.add(key)
@@ -462,12 +461,10 @@ class Cases:
         of the certificate that is itself a violation of a constraint counts as one violation.
         """
         domain = self.problem.domain
-        aggregate, quantity = domain.aggregates[symbol.situation], domain.situations[symbol.situation].quantity
+        aggregate = domain.aggregates[symbol.situation]
         if symbol not in self._bounds:
             first = FactEvaluation(self.lowest, Beginning(self.lowest)).total(aggregate, symbol.arguments)
-            least = -math.inf if quantity is None or quantity.least is None else min(quantity.least, first.low)
-            most = math.inf if quantity is None or quantity.most is None else max(quantity.most, first.high)
-            self._bounds[symbol] = Range(least, most)
+            self._bounds[symbol] = self.lowest.bounds_of(symbol.situation).hull(first)
         allowed, found = self._bounds[symbol], reading.total(aggregate, symbol.arguments)
         if (constraint := domain.constraints.get(symbol.situation)) is not None:
             violation = constraint.situation, FALSE if constraint.always else TRUE
@@ -521,38 +518,3 @@ def narrowed(found: Range, limits: str) -> Range:
         low = max(low, limit) if sign[0] in ">=" else low
         high = min(high, limit) if sign[0] in "<=" else high
     return Range(low, high, found.partial)
-
-
-def own_variables(behavior: Behavior) -> frozenset[str]:
-    """Return the parameters of a behaviour and the variables that its preconditions determine."""
-    found = {parameter.name for parameter in behavior.parameters}
-    return frozenset(found.union(*(variables(condition) for condition in behavior.preconditions)))
-
-
-def unified(
-    problem: Problem,
-    behavior: Behavior,
-    own: frozenset[str],
-    terms: tuple[str | None, ...],
-    words: tuple[str | None, ...],
-) -> dict[str, str] | None:
-    """Return the bindings of a behaviour's variables that make the terms of an effect equal to the given words.
-
-    Return None if there are no such bindings. A word that is None matches any term.
-    """
-    found: dict[str, str] = {}
-    for term, word in zip(terms, words, strict=True):
-        if term is None or word is None:
-            continue
-        kind = behavior.kinds.get(term)
-        if kind is None:
-            if term != word:
-                return None
-        elif word not in problem.members(kind) or (term in own and found.setdefault(term, word) != word):
-            return None
-    return found
-
-
-def applicable(reading: FactEvaluation, behavior: Behavior, given: Mapping[str, str]) -> Iterator[dict[str, str]]:
-    """Yield the bindings of a behaviour's variables that extend `given` and with which the behaviour may be applicable."""
-    yield from reading.solutions(reading.lowest.asked(behavior), given, behavior.kinds)

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from fractions import Fraction
 from functools import partial
 from itertools import combinations, pairwise, product
 from math import prod
@@ -34,16 +35,14 @@ from confab.planner.certificate_checks import (
     ClaimCase,
     Try,
     is_bounded,
-    own_variables,
-    unified,
     wanted_in_the_end,
 )
 from confab.planner.certificates import Certificate
-from confab.planner.checked_conditions import variables
+from confab.planner.checked_conditions import own_variables, unified, variables
 from confab.planner.possibilities import FactEvaluation, Lowest, NoTimeLeftError, Range, WorkLimitError
 from confab.planner.validation import BehaviorReader, LoggedState
 from confab.reasoner.amounts import meets, number, written
-from confab.reasoner.symbols import FALSE, TRUE, AmountEffect, Behavior, Effect, Fact, Problem, State, Symbol
+from confab.reasoner.symbols import FALSE, TRUE, Behavior, Effect, Fact, Problem, State, Symbol
 
 WORK = 3_000_000
 """Maximum work to find a certificate: the number of tested conditions plus the number of behaviours that are tried in cases."""
@@ -282,22 +281,20 @@ class Relaxed:
     def _wider(self, reading: FactEvaluation, symbol: Symbol) -> bool:
         first = number(self.lowest.initial(symbol))
         before = now = self.ranges.get(symbol, Range(first, first))
-        quantity = self.lowest.quantity(symbol.situation)
-        least = -float("inf") if quantity is None or quantity.least is None else quantity.least
-        most = float("inf") if quantity is None or quantity.most is None else quantity.most
+        limits = self.lowest.bounds_of(symbol.situation)
         for behavior in self.lowest.behaviors:
             for effect in behavior.amounts:
                 if effect.situation != symbol.situation:
                     continue
-                constant = effect.operation == "assign" and not isinstance(effect, str) and _number(effect)
+                constant = effect.operation == "assign" and isinstance(effect.amount, Fraction)
                 for env in self._envs(reading, behavior, effect, effect.arguments, symbol.arguments):
                     after = (reading.amounts(behavior, env) or {}).get(symbol)
                     if after is None:
                         continue
                     low, high = after[0].low, after[0].high
                     if not constant:  # widen the range in one step to the farthest reachable amount
-                        low = min(least, now.low) if low < now.low else low
-                        high = max(most, now.high) if high > now.high else high
+                        low = min(limits.low, now.low) if low < now.low else low
+                        high = max(limits.high, now.high) if high > now.high else high
                     now = now.hull(Range(low, high))
         self.ranges[symbol] = now
         return now != before
@@ -343,22 +340,14 @@ class Relaxed:
 
     def _bounds(self, symbol: Symbol) -> str:
         first = number(self.lowest.initial(symbol))
-        found, quantity = self.ranges.get(symbol, Range(first, first)), self.lowest.quantity(symbol.situation)
+        found, limits = self.ranges.get(symbol, Range(first, first)), self.lowest.bounds_of(symbol.situation)
         if not isinstance(found.low, float) and found.low == found.high:
             return written(found.low)
-        least = None if quantity is None else quantity.least
-        most = None if quantity is None else quantity.most
         parts = [
-            f">={written(found.low)}" if not isinstance(found.low, float) and found.low != least else "",
-            f"<={written(found.high)}" if not isinstance(found.high, float) and found.high != most else "",
+            f">={written(found.low)}" if not isinstance(found.low, float) and found.low != limits.low else "",
+            f"<={written(found.high)}" if not isinstance(found.high, float) and found.high != limits.high else "",
         ]
         return ",".join(part for part in parts if part)
-
-
-def _number(effect: AmountEffect) -> bool:
-    return not isinstance(effect.amount, tuple) and not hasattr(effect.amount, "arguments") and not hasattr(
-        effect.amount, "operator"
-    )  # fmt: skip
 
 
 # ----------------------------------------------------------------------------------------------- certificates with cases
@@ -539,7 +528,7 @@ def _refined(cases: Cases, end: ClaimCase, relaxed: Relaxed, goal: State) -> Cer
         if changes is None or not _is(cases, facts, after, bool(wrong)):
             return _told_apart(cases, relaxed, wrong or view.unknown or [])
     goals = [Fact(symbol, wanted) for symbol, wanted in sorted(goal.items())]
-    open_ = [fact for fact in goals if not _met(problem, facts, fact)]
+    open_ = [f for f in goals if not meets(facts.value(f.symbol.situation, f.symbol.arguments) or FALSE, f.value)]
     rests = [] if open_ else _restless(problem, lowest.level, facts)
     for fact in open_ or rests:
         if fact in cases.certificate.unmet:
@@ -571,10 +560,6 @@ def _is(cases: Cases, facts: LoggedState, case: ClaimCase, exactly: bool) -> boo
         if (case[at] == ANY and exactly) or (case[at] != ANY and cases.claims.entry(at, now) != case[at]):
             return False
     return True
-
-
-def _met(problem: Problem, facts: LoggedState, fact: Fact) -> bool:
-    return meets(facts.value(fact.symbol.situation, fact.symbol.arguments) or FALSE, fact.value)
 
 
 def _restless(problem: Problem, level: int, facts: LoggedState) -> list[Fact]:

@@ -333,17 +333,10 @@ class SoftGoal(NamedTuple):
 
 @dataclass(frozen=True)
 class Forgone:
-    """A soft goal that a plan leaves unmet.
+    """A soft goal that a plan leaves unmet, with the cost `weight` of leaving it unmet.
 
-    Parameters
-    ----------
-    fact : Fact
-    weight : Fraction
-        The cost of leaving the goal unmet.
-    price : Fraction, optional
-        The additional cost of a plan that also meets the goal, or None if no such plan was found.
-    conditions : tuple of Condition
-        The conditions of a goal with alternatives or quantifiers.
+    `price` is the additional cost of a plan that also meets the goal, or None if no such plan was found. `conditions` are the
+    conditions of a goal with alternatives or quantifiers.
     """
 
     fact: Fact

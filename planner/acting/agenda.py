@@ -11,17 +11,10 @@ from confab.reasoner.symbols import Problem, State, Symbol
 
 @dataclass
 class RemainingSteps:
-    """The steps still to be executed; the first step may be partly executed.
+    """The steps still to be executed, with the task for which they were planned; the first step may be partly executed.
 
-    Attributes
-    ----------
-    planned_for : Problem
-        The task for which the steps were planned.
-    steps : tuple of Step
-    begun : mapping of path to State
-        The situation before each step in progress.
-    sound : bool
-        Whether each step in progress would be applicable in the situation before it, updated with the facts observed since then.
+    `begun` has the situation before each step in progress. `sound` states whether each step in progress would be applicable in that
+    situation, updated with the facts observed since then.
     """
 
     planned_for: Problem
@@ -59,12 +52,7 @@ class ReplanRequest:
 class Postponed:
     """Postponed goals, each with its value and the reason for postponing it.
 
-    Attributes
-    ----------
-    aside : mapping of Symbol to (value, Reason)
-        Goals that are impossible in the present situation.
-    put_off : mapping of Symbol to (value, Reason)
-        Goals that are unreachable without the facts in doubt.
+    The goals `aside` are impossible in the present situation. The goals `put_off` are unreachable without the facts in doubt.
     """
 
     aside: dict[Symbol, tuple[str, Reason]] = field(default_factory=dict)

@@ -36,12 +36,12 @@ from confab.planner.acting.failure_memory import Caution, refuted_by, relied_on_
 from confab.planner.acting.record import Record
 from confab.planner.acting.repair import difference, repair_or_replan, replan, vanished
 from confab.planner.acting.retries import DEFAULT, Retries, RetryPolicy
-from confab.planner.acting.step_trees import all_steps, chains_of, first_chain, tree_of, without, without_first
+from confab.planner.acting.step_trees import chains_of, tree_of, without
 from confab.planner.acting.unreached import blamed, blocked, with_discoveries
 from confab.planner.acting.world import INTERRUPTED, WITHOUT_EFFECT, Guarded, Verdict, World, WorldError, WorldReport
 from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, renumbered
-from confab.planner.validation import open_goals, successor
+from confab.planner.validation import followed, open_goals
 from confab.reasoner.limits import LimitError, check
 from confab.reasoner.refutations import Refutation
 from confab.reasoner.symbols import FALSE, Fact, Problem, State, Symbol
@@ -82,10 +82,6 @@ def act(
         Failures in earlier episodes; unreliable facts and behaviours are avoided if there is an alternative.
     together : bool
         Whether several actors execute primitives at once, until a primitive fails; the world must be `Concurrent`.
-
-    Returns
-    -------
-    Episode
     """
     if caution is not None and plan is None:
         problem = caution.applied(problem, planner or hierarchical_plan, retry_policy.planning)
@@ -203,7 +199,7 @@ class _RunningEpisode:
             return
         done, events = self.record.done, self.record.events
         surprises = events[-1].surprises if events and what == "end" else ()
-        whole = Plan(tree_of({**done, **{p.path: p for p in all_steps(self.agenda.steps)}}))
+        whole = Plan(tree_of({**done, **{p.path: p for p in Plan(self.agenda.steps).walk()}}))
         clock = 0.0
         with suppress(WorldError):
             clock = self.world.seconds
@@ -218,16 +214,16 @@ class _RunningEpisode:
 
         Return None if the precondition of the primitive doesn't hold.
         """
-        step, problem = first_chain(self.agenda.steps)[-1], self.belief.task
-        after = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, problem.initial)
-        return after and {symbol: value for symbol, value in after.items() if value != UNSEEN}
+        step, problem = next(chains_of(self.agenda.steps))[-1], self.belief.task
+        after = followed(problem, [step], problem.initial)
+        return None if after is None else {symbol: value for symbol, value in after.items() if value != UNSEEN}
 
     def perform(self, expected: dict[Symbol, str]) -> tuple[tuple[Step, ...], State, Verdict]:
         """Execute the next primitive and observe; a failed primitive counts as done if its effects are observed.
 
         Return the primitive with its ancestors, the situation before it, and the verdict.
         """
-        chain, record = first_chain(self.agenda.steps), self.record
+        chain, record = next(chains_of(self.agenda.steps)), self.record
         step, before = chain[-1], self.belief.problem.initial
         for above in chain[:-1]:
             self.agenda.begun.setdefault(above.path, before)
@@ -249,7 +245,7 @@ class _RunningEpisode:
         )
         if done:
             record.done.update((above.path, above) for above in chain)
-            self.agenda.steps = without_first(self.agenda.steps)
+            self.agenda.steps = without(self.agenda.steps, {step.path})
         if surprises:
             self.request_replan("; ".join(map(_told, surprises[:3])), surprises)
         self.say("end", step, changes)
@@ -274,7 +270,7 @@ class _RunningEpisode:
             step, chain = slot.step, chains[slot.step.path]
             for above in chain[:-1]:
                 self.agenda.begun.setdefault(above.path, state)
-            after = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, state) or state
+            after = followed(problem, [step], state) or state
             changes = [Fact(s, v) for s, v in sorted(after.items()) if state.get(s) != v]
             there = bool(changes) and all(seen.get(fact.symbol) == fact.value for fact in changes)
             relied_on = tuple(relied_on_by(problem, chain))
@@ -348,8 +344,8 @@ class _RunningEpisode:
         if not self.waiting:
             return []
         steps = self.agenda.steps if self.together else self.agenda.steps[:1]
-        left = {step.path for step in all_steps(without(steps, finished))}
-        gone = {step.path: step for step in (*self.record.done.values(), *all_steps(steps))}
+        left = {step.path for step in Plan(without(steps, finished)).walk()}
+        gone = {step.path: step for step in (*self.record.done.values(), *Plan(steps).walk())}
         gone = {path: step for path, step in gone.items() if path not in left}
         first = self.belief.problem.domain.levels[0]
         ids = {one.id for step in gone.values() if step.level == first for one in step.together}
@@ -386,7 +382,7 @@ class _RunningEpisode:
         for surprise in surprises:
             self.request.missed.setdefault(surprise.symbol, surprise.expected)
         changes = {s.symbol: s.observed for s in surprises}
-        for step in first_chain(self.agenda.steps)[:-1]:
+        for step in next(chains_of(self.agenda.steps), ())[:-1]:
             if step.path in self.agenda.begun:
                 as_if = {s: v for s, v in {**self.agenda.begun[step.path], **changes}.items() if v is not None}
                 self.agenda.sound = self.agenda.sound and self.belief.could_begin(step, as_if)
