@@ -264,39 +264,32 @@ class Cases:
 
     def first(self) -> ClaimCase | None:
         """Return the initial case, or None if some claim doesn't hold in the initial state; `fault` then names the claim."""
+        self.fault = next(self._wrong_at_first(), "")
+        entries = (self.claims.entry(i, self.lowest.initial(symbol)) for i, symbol in enumerate(self.claims.symbols))
+        return None if self.fault else tuple(entries)
+
+    def _wrong_at_first(self) -> Iterator[str]:
+        """Yield the claims that don't hold in the initial state, or that no certificate may make."""
         lowest, certificate = self.lowest, self.certificate
         for symbol in (*certificate.always, *certificate.told_apart, *(fact.symbol for fact in certificate.never)):
             if not lowest.exists(symbol.situation, symbol.arguments):
-                self.fault = f"there is no {symbol}"
-                return None
+                yield f"there is no {symbol}"
             if lowest.quantity(symbol.situation) is not None and certificate.told_apart.get(symbol):
-                self.fault = (
-                    f"the certificate lists amounts of {symbol}; it may only distinguish all amounts of a symbol"
-                )
-                return None
+                yield f"the certificate lists amounts of {symbol}; it may only distinguish all amounts of a symbol"
         for fact in certificate.never:
             if lowest.quantity(fact.symbol.situation) is not None:
-                self.fault = (
-                    f"{fact}: the certificate must claim bounds that always hold for an amount, not single amounts"
-                )
-                return None
+                yield f"{fact}: the certificate must claim bounds that always hold for an amount, not single amounts"
             if lowest.initial(fact.symbol) == fact.value:
-                self.fault = f"{fact} holds in the beginning"
-                return None
+                yield f"{fact} holds in the beginning"
         for symbol, value in certificate.always.items():
-            first = lowest.initial(symbol)
-            amount = lowest.quantity(symbol.situation) is not None
-            if amount and any(sign in "<>" for sign, _ in bounds(value)):
-                raise ValueError(f"bounds of {symbol} have to be <= or >=, not {value}")
-            exactly = Range(number(first), number(first)) if amount else None
-            within = self.claims.range(symbol) if amount else None
-            if (exactly and within and not (within.low <= exactly.low <= within.high)) or (
-                not amount and first != value
-            ):
-                self.fault = f"{symbol} isn't {value} in the beginning"
-            if self.fault:
-                return None
-        return tuple(self.claims.entry(i, lowest.initial(symbol)) for i, symbol in enumerate(self.claims.symbols))
+            first, so = lowest.initial(symbol), lowest.initial(symbol) == value
+            if lowest.quantity(symbol.situation) is not None:
+                if any(sign in "<>" for sign, _ in bounds(value)):
+                    raise ValueError(f"bounds of {symbol} have to be <= or >=, not {value}")
+                within = self.claims.range(symbol)
+                so = within.low <= number(first) <= within.high
+            if not so:
+                yield f"{symbol} isn't {value} in the beginning"
 
     # ------------------------------------------------------------------------------------------------------- search
 

@@ -11,8 +11,17 @@ from confab.planner.certificate_checks import Cases, CaseView, Claims
 from confab.planner.certificates import Certificate
 from confab.planner.checked_conditions import own_variables, unified, variables
 from confab.planner.plan import Reason
-from confab.planner.possibilities import ANYTHING, FactEvaluation, Lowest, Range, WorkLimitError, compared
-from confab.reasoner.amounts import MORE, Expression, bounds, terms_of, towards, written
+from confab.planner.possibilities import (
+    ANYTHING,
+    OPERATORS,
+    FactEvaluation,
+    Lowest,
+    Range,
+    WorkLimitError,
+    calculated,
+    compared,
+)
+from confab.reasoner.amounts import MORE, bounds, terms_of, towards, written
 from confab.reasoner.sentences import an, said
 from confab.reasoner.symbols import (
     FALSE,
@@ -308,7 +317,8 @@ class _Causes:
         if fact.value == self.certificate.always.get(fact.symbol) or not isinstance(effect, AmountEffect):
             return True
         reading, _ = self.reading()
-        by = reading.expression(effect.amount, given) if variables_of(effect.amount) <= given.keys() else ANYTHING
+        known = all(term in given for term in terms_of(effect.amount) if term.startswith("?"))
+        by = reading.expression(effect.amount, given) if known else ANYTHING
         if by is None or effect.operation not in ("increase", "decrease"):
             return True
         more = (self.direction(fact) == MORE) is (effect.operation == "increase")
@@ -405,21 +415,17 @@ class _Causes:
         return Cause("")
 
     def beyond(
-        self, reading: FactEvaluation, env: dict[str, str], effect: Effect
+        self, reading: FactEvaluation, env: dict[str, str], effect: AmountEffect
     ) -> Iterator[tuple[str, tuple[str, ...]]]:
         """Yield as text how an effect would violate the bounds of an amount."""
-        from confab.planner.possibilities import OPERATORS, calculated
-
         symbol = Symbol(effect.situation, tuple(env.get(a, a) for a in effect.arguments))
         quantity = self.lowest.quantity(effect.situation)
         old = reading.between(effect.situation, symbol.arguments)
-        by = reading.expression(effect.amount, env)  # type: ignore[union-attr]
+        by = reading.expression(effect.amount, env)
         if quantity is None or old is None:
             return
-        words = _named(symbol)
-        terms = (*symbol.arguments, symbol.situation)
-        operation = effect.operation  # type: ignore[union-attr]
-        new = by if by is None or operation == "assign" else calculated(OPERATORS[operation], old, by)
+        words, terms = _named(symbol), (*symbol.arguments, symbol.situation)
+        new = by if by is None or effect.operation == "assign" else calculated(OPERATORS[effect.operation], old, by)
         constraint = self.problem.domain.constraints.get(symbol.situation)
         if constraint is not None:
             yield f"violate the constraint that {constraint}", (constraint.situation,)
@@ -475,11 +481,6 @@ def false_equality(condition: Condition) -> bool:
         return False
     left, right = condition.left, condition.right
     return condition.negated if left == right else not condition.negated and "?" not in (left[0], right[0])
-
-
-def variables_of(expression: Expression) -> set[str]:
-    """Return the variables in an expression."""
-    return {term for term in terms_of(expression) if term.startswith("?")}
 
 
 def counted(condition: Condition | None) -> tuple[int, str, tuple[Condition, ...]]:

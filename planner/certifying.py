@@ -59,9 +59,9 @@ PAIR, FEWER, SHARE = 100_000, 200_000, 0.5
 FEW = 3
 """Maximum number of distinguished values of a symbol; if more are needed, all its values are distinguished."""
 ReachabilityQuestion: TypeAlias = "tuple[str, Symbol, str]"
-"""Kinds of questions about reachability: can a symbol get a value (`GETS`), can a symbol lose its value, or an amount
-change (`LEAVES`), can a condition on the final state hold (`ENDS`)?"""
-GETS, LEAVES, ENDS = "gets", "leaves", "ends"
+"""Kinds of questions about reachability: can a symbol get a value (`GETS`), can a symbol lose its value (`LEAVES`), which amounts
+can a symbol get (`RANGE`), can a condition on the final state hold (`ENDS`)?"""
+GETS, LEAVES, RANGE, ENDS = "gets", "leaves", "range", "ends"
 KINDS = ("facts", "bounds", "pairs", "cases", "states")
 """Kinds of certificates: unreachable facts; goals that exclude each other in every state; two goals that exclude each other;
 distinguished values; all values."""
@@ -200,7 +200,7 @@ class Relaxed:
         if symbol.situation in self.problem.domain.aggregates:
             return self.lowest.allowed(symbol)
         first = self.lowest.initial(symbol)
-        self._ask((LEAVES, symbol, first))
+        self._ask((RANGE, symbol, first))
         return self.ranges.get(symbol, Range(number(first), number(first)))
 
     def _ask(self, key: ReachabilityQuestion) -> bool:
@@ -221,47 +221,31 @@ class Relaxed:
         while self._waiting and key not in self.possible:
             one = next(iter(self._waiting))
             del self._waiting[one]
-            if self._news(one):
+            if one not in self.possible and self._examined(one):
+                if one[0] != RANGE:
+                    self.possible.add(one)
                 self._waiting.update(self._readers[one])
         return key in self.possible
 
-    def look(self, key: ReachabilityQuestion) -> FactEvaluation:
-        """Return the reader of conditions for one question.
+    def _examined(self, key: ReachabilityQuestion) -> bool:
+        """Return whether the answer to a question is yes, or the range of an amount wider, according to the present knowledge.
 
         `reads` records the other questions on which the answer depends.
         """
-        self._asking, self.reads = key, {}
-        return FactEvaluation(self.lowest, self)
-
-    def _news(self, key: ReachabilityQuestion) -> bool:
-        """Examine a question again.
-
-        Return whether its answer has changed to possible, or to a wider range of an amount.
-        """
-        kind, symbol, _ = key
-        reading = self.look(key)
-        if kind == LEAVES and self.lowest.quantity(symbol.situation) is not None:
-            return self._wider(reading, symbol)
-        if key in self.possible or not self.brought_about(reading, key):
-            return False
-        self.possible.add(key)
-        return True
-
-    def brought_about(self, reading: FactEvaluation, key: ReachabilityQuestion) -> bool:
-        """Return whether the answer to a question is yes according to the present knowledge."""
         kind, symbol, value = key
+        self._asking, self.reads = key, {}
+        reading = FactEvaluation(self.lowest, self)
         if kind == ENDS:
             return reading.goal(symbol, value)
-        return any(self.possible_ways(reading, symbol, value, other=kind == LEAVES))
-
-    def possible_ways(self, reading: FactEvaluation, symbol: Symbol, value: str, other: bool) -> Iterator[Try]:
-        """Yield the behaviours, with individuals, that may give a symbol a value (or, with `other`, a different value)."""
+        if kind == RANGE:
+            return self._wider(reading, symbol)
         for behavior, effect in self.lowest.effects.get(symbol.situation, ()):
-            words = (*symbol.arguments, None if other else value)
+            words = (*symbol.arguments, value if kind == GETS else None)
             for env in self._envs(reading, behavior, effect, (*effect.arguments, effect.value), words):
                 becomes = env.get(effect.value, effect.value)
-                if (becomes != value) == other and reading.amounts(behavior, env) is not None:
-                    yield Try(behavior, env)
+                if (becomes == value) is (kind == GETS) and reading.amounts(behavior, env) is not None:
+                    return True
+        return False
 
     def _envs(
         self,
@@ -320,21 +304,13 @@ class Relaxed:
                 continue
             seen.add(key)
             kind, symbol, value = key
-            amount = self.lowest.quantity(symbol.situation) is not None
+            if kind == RANGE and not (value := self._bounds(symbol)):
+                continue  # the symbol may have any allowed amount
             if kind == GETS:
                 never.add(Fact(symbol, value))
-            elif kind == LEAVES and not amount:
+            elif kind != ENDS:
                 always[symbol] = value
-            elif kind == LEAVES:
-                text = self._bounds(symbol)
-                if not text:
-                    continue  # the symbol may have any allowed amount
-                always[symbol] = text
-            reading = self.look(key)
-            if kind == LEAVES and amount:
-                self._wider(reading, symbol)
-            else:
-                self.brought_about(reading, key)
+            self._examined(key)
             waiting += self.reads
         return never, always
 
@@ -529,7 +505,7 @@ def _refined(cases: Cases, end: ClaimCase, relaxed: Relaxed, goal: State) -> Cer
             return _told_apart(cases, relaxed, wrong or view.unknown or [])
     goals = [Fact(symbol, wanted) for symbol, wanted in sorted(goal.items())]
     open_ = [f for f in goals if not meets(facts.value(f.symbol.situation, f.symbol.arguments) or FALSE, f.value)]
-    rests = [] if open_ else _restless(problem, lowest.level, facts)
+    rests = [] if open_ else _restless(problem, facts)
     for fact in open_ or rests:
         if fact in cases.certificate.unmet:
             view = CaseView(cases.claims, path[0][2] if path else end, unknown=[])
@@ -562,7 +538,7 @@ def _is(cases: Cases, facts: LoggedState, case: ClaimCase, exactly: bool) -> boo
     return True
 
 
-def _restless(problem: Problem, level: int, facts: LoggedState) -> list[Fact]:
+def _restless(problem: Problem, facts: LoggedState) -> list[Fact]:
     """Return the rest values, or initial values, that a final state must have and that the given state doesn't have."""
     found = []
     for symbol, now in sorted(facts.state().items()):

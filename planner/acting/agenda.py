@@ -1,4 +1,4 @@
-"""The agenda of an episode: the steps still to be executed, postponed goals, and requests to check the steps."""
+"""The agenda of an episode: the steps still to be executed, and postponed goals."""
 
 from __future__ import annotations
 
@@ -30,22 +30,6 @@ class RemainingSteps:
             if [str(s) for s in now.walk()] == [str(s) for s in new.walk()]:
                 return (now, *renumbered(steps[1:], following))
         return renumbered(steps, following)
-
-
-@dataclass
-class ReplanRequest:
-    """A request to check the agenda.
-
-    The request contains the reason, and the expected values that were not observed. The reason is empty if there is no request.
-    """
-
-    why: str = ""
-    missed: dict[Symbol, str | None] = field(default_factory=dict)
-
-    def add(self, why: str) -> None:
-        """Add a reason to the request."""
-        if why not in self.why:
-            self.why = f"{self.why}; {why}" if self.why else why
 
 
 @dataclass

@@ -19,7 +19,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from time import perf_counter
 
-from confab.planner.acting.agenda import Postponed, RemainingSteps, ReplanRequest
+from confab.planner.acting.agenda import Postponed, RemainingSteps
 from confab.planner.acting.belief import UNSEEN, Belief
 from confab.planner.acting.episode import (
     End,
@@ -101,7 +101,7 @@ def act(
         while run.going:
             check("acting")
             run.intervene()
-            if run.request.why:
+            if run.requested:
                 run.reconsider()
             elif not run.agenda.steps:
                 run.finish()
@@ -136,7 +136,8 @@ class _RunningEpisode:
     together: bool
     going: bool = True
     goals: Postponed = field(default_factory=Postponed)
-    request: ReplanRequest = field(default_factory=ReplanRequest)
+    requested: str = ""  # the reason for checking the agenda, if a check is requested
+    missed: dict[Symbol, str | None] = field(default_factory=dict)  # values that were expected and not observed
 
     def __post_init__(self) -> None:
         self.record, self.agenda = Record(self.belief.state), RemainingSteps(self.belief.problem)
@@ -151,7 +152,7 @@ class _RunningEpisode:
         self.world.announce(tuple(i for i in self.waiting if i.at is not None))
         begun, outcome, limits = plan, None, self.retries.policy.planning
         if begun is None:
-            self.request.why = ""
+            self.requested = ""
             self.set_aside_the_vanished()
             begin = perf_counter()
             steps, outcome = replan(self.belief.problem, self.planner, self.belief.using, limits)
@@ -225,9 +226,7 @@ class _RunningEpisode:
         """
         chain, record = next(chains_of(self.agenda.steps)), self.record
         step, before = chain[-1], self.belief.problem.initial
-        for above in chain[:-1]:
-            self.agenda.begun.setdefault(above.path, before)
-        changes = [Fact(s, v) for s, v in sorted(expected.items()) if before.get(s) != v]
+        changes = self.begin(chain, before, expected)
         self.say("begin", step, changes)
         begin = self.world.seconds
         verdict = self.world.execute(step)
@@ -236,8 +235,7 @@ class _RunningEpisode:
         if verdict.ok and self.without_effect(changes, seen):
             text = f"{step} was reported as done, but {changes[0]} is not seen"
             verdict = WorldReport(False, WITHOUT_EFFECT, step.arguments, text)
-        there = bool(changes) and all(seen.get(fact.symbol) == fact.value for fact in changes)
-        done = verdict.ok or (there and verdict.code != INTERRUPTED)
+        done = is_done(verdict, changes, seen)
         surprises = self.look(expected if done else dict(before), seen)
         relied_on = tuple(relied_on_by(self.belief.problem, chain))
         record.events.append(
@@ -247,11 +245,17 @@ class _RunningEpisode:
             record.done.update((above.path, above) for above in chain)
             self.agenda.steps = without(self.agenda.steps, {step.path})
         if surprises:
-            self.request_replan("; ".join(map(_told, surprises[:3])), surprises)
+            self.request_replan("", surprises)
         self.say("end", step, changes)
         if len(record.events) >= self.retries.most:
             self.give_up(Reason(f"stopped at the limit of {self.retries.most} primitives"))
         return chain, before, verdict
+
+    def begin(self, chain: tuple[Step, ...], before: State, after: State) -> list[Fact]:
+        """Record that the ancestors of a primitive have begun; return the facts that the primitive changes."""
+        for above in chain[:-1]:
+            self.agenda.begun.setdefault(above.path, before)
+        return [Fact(s, v) for s, v in sorted(after.items()) if before.get(s) != v]
 
     def perform_together(self) -> None:
         """Execute the remaining primitives with all actors at once, until all have ended or something unexpected happens.
@@ -268,14 +272,11 @@ class _RunningEpisode:
         failed = list[tuple[tuple[Step, ...], State, Verdict]]()
         for slot, verdict in ended:
             step, chain = slot.step, chains[slot.step.path]
-            for above in chain[:-1]:
-                self.agenda.begun.setdefault(above.path, state)
             after = followed(problem, [step], state) or state
-            changes = [Fact(s, v) for s, v in sorted(after.items()) if state.get(s) != v]
-            there = bool(changes) and all(seen.get(fact.symbol) == fact.value for fact in changes)
+            changes = self.begin(chain, state, after)
             relied_on = tuple(relied_on_by(problem, chain))
             record.events.append(ExecutedPrimitive(step, slot.begin, slot.end, verdict.ok, verdict.code, (), relied_on))
-            if verdict.ok or (there and verdict.code != INTERRUPTED):
+            if is_done(verdict, changes, seen):
                 record.done.update((above.path, above) for above in chain)
                 finished.add(step.path)
                 record.changes(state, after, slot.end)
@@ -288,7 +289,7 @@ class _RunningEpisode:
         self.belief.problem = replace(problem, initial=state)
         surprises = self.look(dict(state), seen)
         if surprises or self.agenda.steps:
-            self.request_replan("; ".join(map(_told, surprises[:3])) or "the actors were interrupted", surprises)
+            self.request_replan("" if surprises else "the actors were interrupted", surprises)
         if len(record.events) >= self.retries.most:
             self.give_up(Reason(f"stopped at the limit of {self.retries.most} primitives"))
         for chain, before, verdict in failed:
@@ -337,7 +338,7 @@ class _RunningEpisode:
             self.note(intervention, now)
         if any(i.of_world for i in due):
             surprises = self.look(self.belief.state)
-            self.request_replan("; ".join(map(_told, surprises[:3])), surprises)
+            self.request_replan("", surprises)
 
     def due(self, finished: Container[tuple[int, ...]] = ()) -> list[Intervention]:
         """Return the interventions that are due when, beside the recorded primitives, those at some paths have finished."""
@@ -377,10 +378,12 @@ class _RunningEpisode:
         self.say("intervention", text=intervention.text)
 
     def request_replan(self, why: str, surprises: Sequence[Surprise] = ()) -> None:
-        """Request that the agenda is checked again."""
-        self.request.add(why)
+        """Request that the agenda is checked again, for a reason or because of surprises."""
+        why = why or "; ".join(map(_told, surprises[:3]))
+        if why not in self.requested:
+            self.requested = f"{self.requested}; {why}" if self.requested else why
         for surprise in surprises:
-            self.request.missed.setdefault(surprise.symbol, surprise.expected)
+            self.missed.setdefault(surprise.symbol, surprise.expected)
         changes = {s.symbol: s.observed for s in surprises}
         for step in next(chains_of(self.agenda.steps), ())[:-1]:
             if step.path in self.agenda.begun:
@@ -391,8 +394,8 @@ class _RunningEpisode:
 
     def reconsider(self) -> None:
         """Repair the plan, or replan; drop unreachable goals."""
-        why, self.request.why, belief, record = self.request.why, "", self.belief, self.record
-        if self.request.missed:
+        why, self.requested, belief, record = self.requested, "", self.belief, self.record
+        if self.missed:
             self.want_again(self.goals.aside)
         self.set_aside_the_vanished()
         counted = len(record.events), len(record.interventions), len(record.failures), len(record.discovered)
@@ -407,7 +410,7 @@ class _RunningEpisode:
         limits, old = self.retries.policy.planning, self.agenda.steps
         end = limits.end()
         if self.repairs:
-            expected = {s: v for s, v in {**belief.state, **self.request.missed}.items() if v is not None}
+            expected = {s: v for s, v in {**belief.state, **self.missed}.items() if v is not None}
             planned = replace(self.agenda.planned_for, initial=expected)
             begun = bool(old) and old[0].path in self.agenda.begun
             repaired = repair_or_replan(
@@ -419,7 +422,7 @@ class _RunningEpisode:
             kind, cost = "replan", float(len(Plan(steps or ()).primitives))
         seconds = perf_counter() - begin
         record.seconds["repairing"] += seconds
-        self.agenda.planned_for, self.agenda.sound, self.request.missed = belief.task, True, {}
+        self.agenda.planned_for, self.agenda.sound, self.missed = belief.task, True, {}
         if steps is None:
             self.on_no_plan(outcome, limits.until(end))
             return
@@ -504,7 +507,7 @@ class _RunningEpisode:
         self.belief.want({})
         self.goals.clear()
         self.retries.most = len(self.record.events) + self.retries.policy.primitives
-        self.request.why = reason.text
+        self.requested = reason.text
 
     # ---------------------------------------------------------------------------------------------------- failures
 
@@ -555,6 +558,12 @@ class _RunningEpisode:
         self.agenda.sound = False
         self.request_replan(f"failed primitives are retried: {why}")
         return True
+
+
+def is_done(verdict: Verdict, changes: Sequence[Fact], seen: State) -> bool:
+    """Return whether a primitive has succeeded: it was reported as done, or all its effects are observed."""
+    there = bool(changes) and all(seen.get(fact.symbol) == fact.value for fact in changes)
+    return verdict.ok or (there and verdict.code != INTERRUPTED)
 
 
 def _told(surprise: Surprise) -> str:
