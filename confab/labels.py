@@ -32,7 +32,7 @@ AT_ONCE = 400
 """Maximum number of terms in one query for labels."""
 
 
-@known_as("the labels")
+@known_as("a set of labels")
 @brief
 @dataclass(frozen=True)
 class Labels:

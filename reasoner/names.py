@@ -123,10 +123,8 @@ def _ontology_name(iri: str) -> str:
     return local_name(iri.partition("#")[0] if "#" in iri else iri.rpartition("/")[0])
 
 
-FEW_NAMES = 40
-"""Maximum number of names that are listed in an error if no name is similar to the wrong name."""
 GUESSING: list[str] = []
-"""Names of modules that suggest the right name for a wrong name, by functions `guessed`, `chosen` and `needless`; `confab` adds one
+"""Names of modules that suggest the right name for a wrong name, by functions `hint`, `chosen` and `needless`; `confab` adds one
 module."""
 
 
@@ -204,7 +202,7 @@ def known_as(kind: str) -> Callable[[C], C]:
 
         def without_items(self: object, index: object) -> NoReturn:
             """Raise `TypeError`; Python also calls this method for an iteration, and for the operator ``in``."""
-            raise TypeError(f"{kind} has no items{_suggested(kind, 'items')}")
+            raise TypeError(f"{kind} has no items{_hint(kind, 'items', public_names(self))}")
 
         type.__setattr__(cls, "_kind", kind)
         type.__setattr__(cls, "__getattr__", lacking)  # hidden from type checkers, which report wrong names
@@ -309,10 +307,16 @@ def _keys(unpacked: str, module: str) -> Iterable[str]:
     return keys
 
 
-def _suggested(kind: str, name: str, known: Collection[str] = ()) -> str:
-    """Return ``; use x`` with the name that a wrong name most likely means, or an empty text."""
-    meant = next((import_module(each).guessed(kind.split()[-1], name, known) for each in GUESSING), "")
-    return f"; use {meant}" if meant else ""
+def public_names(there: object) -> list[str]:
+    """Return the sorted public names of an object, or of a class with its fields."""
+    return sorted(
+        each for each in {*dir(there), *getattr(there, "__dataclass_fields__", ())} if not each.startswith("_")
+    )
+
+
+def _hint(kind: str, name: str, known: Collection[str] = ()) -> str:
+    """Return the end of the error about a wrong name: what the user probably means, or what the object has."""
+    return next((import_module(each).hint(kind, name, known) for each in GUESSING), nearest(name, known))
 
 
 class WrongNameError(AttributeError):
@@ -341,13 +345,7 @@ class WrongNameError(AttributeError):
         text = f"{kind} has no '{name}'" + (f" that can be {self._verb}" if self._verb else "")
         if name.startswith("_"):
             return text
-        every = {*dir(there), *getattr(there, "__dataclass_fields__", ())}
-        known = sorted(each for each in every if not each.startswith("_"))
-        asked = "_".join(filter(None, (self._verb, name)))
-        return text + (
-            _suggested(kind, asked, known)
-            or nearest(name, known, f"it has {', '.join(known)}" if len(known) <= FEW_NAMES else "")
-        )
+        return text + _hint(kind, "_".join(filter(None, (self._verb, name))), public_names(there))
 
     def __reduce__(self) -> tuple[type[AttributeError], tuple[str]]:
         """Return the reduced form for copying and pickling: an `AttributeError` with the message."""

@@ -26,7 +26,11 @@ class Applied:
 class Model:
     """The behaviours of one problem as functions of states that are tuples.
 
-    The symbols are those of the initial state, all boolean symbols, and the defined symbols of the goal.
+    Parameters
+    ----------
+    problem : Problem
+        The problem determines the symbols: the symbols of the initial state, all boolean symbols, and the defined symbols of
+        the goal.
     """
 
     def __init__(self, problem: Problem) -> None:

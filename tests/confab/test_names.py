@@ -15,11 +15,13 @@ from pathlib import Path
 import pytest
 
 import confab
+import confab.why  # its classes have an overview, too
 from confab.cli import main
-from confab.guessing import CLASSES, guessed
-from confab.hints import COMMANDS, HINTS
+from confab.guessing import groups, hint, known, listed
+from confab.hints import COMMANDS, HINTS, OVERVIEW
 from confab.planner.plan import Plan
 from confab.planner.timed.plan import TimedPlan
+from confab.reasoner.names import public_names
 from confab.reasoner.symbols import Fact
 from confab.sim.verdict import Verdict
 from confab.sim.verify import Rollout, StepReport
@@ -80,14 +82,65 @@ def things(scene: confab.Scene, result: confab.Result) -> dict[str, object]:
     }
 
 
-def test_the_error_on_each_listed_wrong_name_gives_the_right_name(things: dict[str, object]) -> None:
+def first(kind: str, name: str) -> str:
+    """Return the first suggestion of the hint about a wrong name; empty if the hint is only an overview."""
+    found = re.match(r"; (?:use|perhaps) (.+?)(\. [A-Z].* has, |$)", hint(f"a {kind}", name))
+    return found[1] if found else ""
+
+
+def kinds_of_objects() -> dict[type, str]:
+    """Return the classes whose errors about wrong names give hints, each with its kind."""
+    found, waiting = dict[type, str](), [object]
+    while waiting:
+        for cls in {*type.__subclasses__(waiting.pop())} - {type}:
+            waiting.append(cls)
+            kind = cls.__dict__.get("_kind")
+            if isinstance(kind, str) and cls.__module__.startswith("confab."):
+                found[cls] = kind.split()[-1]
+    return found
+
+
+def test_the_error_on_each_listed_wrong_name_gives_only_the_right_name(things: dict[str, object]) -> None:
     for kind, there in things.items():
-        for right, names in HINTS[kind].items():
-            for name in names.split():
-                if not hasattr(there, name):
-                    with pytest.raises(AttributeError) as told:
-                        getattr(there, name)
-                    assert str(told.value).endswith(f"use {right}"), name
+        for name, _ in listed(kind):
+            if not hasattr(there, name):
+                with pytest.raises(AttributeError) as told:
+                    getattr(there, name)
+                right = (
+                    re.sub(r"^scene\b", "confab.load(SCENE)", known(kind)[name])
+                    if kind == "confab"
+                    else known(kind)[name]
+                )
+                assert str(told.value).endswith(f"has no '{name}'; use {right}"), name
+
+
+@pytest.mark.usefixtures("things")  # imports the classes
+def test_each_public_name_is_in_exactly_one_group_of_the_overview_of_its_object() -> None:
+    of_kind = dict[str, list[str]]()
+    for cls, kind in kinds_of_objects().items():
+        of_kind.setdefault(kind, []).extend(public_names(cls))
+    classes = ("Curve", "Execution", "KnowledgeError", "Memory", "Report", "Result", "Scene", "Table")
+    of_kind["confab"] = [*(name for name in confab.__all__ if name not in classes), *classes, "__version__"]
+    assert set(OVERVIEW) == set(of_kind)
+    homes = {"confab": "confab.", "memory": "confab.Memory."}
+    for kind, names in of_kind.items():
+        shown = [item.removeprefix(homes.get(kind, ".")) for group in groups(kind).values() for item in group]
+        own = [item.partition("(")[0] for item in shown if re.fullmatch(r"\w+(\([^()]*\))?", item)]
+        told = [name for name in own if name in names or name not in dir(builtins)]
+        assert (len({*told}), {*told}) == (len(told), {*names}), kind
+
+
+def test_an_uncertain_name_is_answered_by_a_readable_overview_by_purpose(things: dict[str, object]) -> None:
+    for there in things.values():
+        with pytest.raises(AttributeError) as told:
+            getattr(there, "frobnicate")  # noqa: B009
+        text = str(told.value)
+        assert re.search(r"has no 'frobnicate'\. (The|An?) .* has, [a-z ]+.*: ", text)
+        assert len(text) < 640
+    with pytest.raises(
+        AttributeError, match=r"no 'frob_facts'; perhaps facts\. A scene has, to read: facts, .*to plan: plan\(\);"
+    ):
+        getattr(things["scene"], "frob_facts")  # noqa: B009
 
 
 def test_no_table_of_hints_has_a_wrong_name_twice() -> None:
@@ -98,7 +151,7 @@ def test_no_table_of_hints_has_a_wrong_name_twice() -> None:
 
 def test_all_names_in_hints_exist(things: dict[str, object]) -> None:
     for kind, there in things.items():
-        for right in HINTS[kind]:
+        for right in [*HINTS.get(kind, ()), *(item for group in groups(kind).values() for item in group)]:
             path = re.match(r"[\w.]*", right)
             assert path is not None
             first, *rest = path[0].split(".")
@@ -165,30 +218,34 @@ GUESSED = {
 @pytest.mark.parametrize("kind", GUESSED)
 def test_a_wrong_name_is_matched_by_its_words(kind: str) -> None:
     pairs = [pair.split(":") for pair in GUESSED[kind].split()]
-    told = {name: guessed(kind, name) for name, _ in pairs}
+    told = {name: first(kind, name) for name, _ in pairs}
     assert [(name, told[name]) for name, right in pairs if right not in told[name]] == []
-    assert guessed(kind, "xyzzy") == ""
+    assert first(kind, "xyzzy") == ""
 
 
 def test_a_name_of_another_library_s_object_leads_to_the_conversion_into_this_object() -> None:
-    assert guessed("scene", "isomorphic") == "graph.isomorphic()"
-    assert guessed("scene", "disjoint_classes") == "owl.disjoint_classes()"
-    assert guessed("plan", "number_of_nodes") == "to_networkx().number_of_nodes()"
+    assert first("scene", "isomorphic") == "graph.isomorphic()"
+    assert first("scene", "disjoint_classes") == "owl.disjoint_classes()"
+    assert first("plan", "number_of_nodes") == "to_networkx().number_of_nodes()"
     pytest.importorskip("pandas")
-    assert guessed("plan", "iterrows") == "to_dataframe().iterrows()"
-    assert guessed("result", "iloc") == "plan.to_dataframe().iloc"
+    assert first("plan", "iterrows") == "to_dataframe().iterrows()"
+    assert first("result", "iloc") == "plan.to_dataframe().iloc"
 
 
 def test_a_wrong_name_that_another_object_s_table_lists_leads_to_that_object() -> None:
     asked = [("confab", "load_result"), ("result", "tail"), ("step", "to_file"), ("plan", "remove_goal")]
-    assert [guessed(*each) for each in asked] == [
-        "confab.load(SCENE).read_result(FILE)", "plan[-1]", "result.save(FILE)", "scene.with_goal",
+    assert [first(*each) for each in asked] == [
+        "confab.load(SCENE).read_result(FILE)", "plan[-1]", "result.save(FILE)", "scene.with_goal(FACT)",
     ]  # fmt: skip
 
 
-def test_a_word_that_no_table_has_is_understood_by_words_with_the_same_meaning() -> None:
-    asked = {("scene", "inventory"): "objects", ("scene", "believe"): "with_fact", ("result", "went_well"): "solved"}
-    assert {each: guessed(*each) for each in asked} == asked
+def test_an_everyday_word_leads_to_the_right_name() -> None:
+    asked = {
+        ("scene", "inventory"): "objects",
+        ("scene", "believe"): "with_fact(FACT)",
+        ("result", "went_well"): "solved",
+    }
+    assert {each: first(*each) for each in asked} == asked
 
 
 def test_an_iteration_over_an_object_without_items_names_what_has_items(things: dict[str, object]) -> None:
@@ -371,12 +428,6 @@ def test_an_unknown_option_names_another_one_an_argument_or_a_command(
     assert said in refused(line)
 
 
-def test_each_class_with_known_wrong_names_has_a_description(things: dict[str, object]) -> None:
-    kinds = {getattr(type(there), "_kind").split()[-1] for there in things.values() if there is not confab}  # noqa: B009
-    assert kinds - set(CLASSES) == set()
-    assert set(HINTS) == set(things)
-
-
 def test_values_are_represented_in_one_short_line(things: dict[str, object]) -> None:
     texts = {kind: repr(there) for kind, there in things.items() if kind not in ("plan", "table")}
     assert {kind: text for kind, text in texts.items() if "\n" in text or len(text) > 320} == {}
@@ -398,7 +449,7 @@ def test_the_words_of_a_name_are_found_behind_capital_letters_and_beside_unknown
         ("scene", "instances_of_class"): "objects",
         ("scene", "run_physics"): "verify",
     }
-    assert {key: guessed(*key) for key, right in names.items() if right not in guessed(*key)} == {}
+    assert {key: first(*key) for key, right in names.items() if right not in first(*key)} == {}
 
 
 @pytest.mark.parametrize(
