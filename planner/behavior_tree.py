@@ -22,7 +22,7 @@ import networkx
 from confab.planner.acting.schedule import PartialOrder, partial_order, worker_of, workers_of
 from confab.planner.causal_links import FactChange, Need, NeedKind, Purpose, purposes
 from confab.planner.plan import Plan, Step
-from confab.planner.validation import BehaviorReader, LoggedState, successor
+from confab.planner.validation import BehaviorReader, LoggedState, followed
 from confab.reasoner.amounts import meets
 from confab.reasoner.limits import check
 from confab.reasoner.symbols import Condition, Fact, Problem, State, Symbol
@@ -95,15 +95,7 @@ TreeNode: TypeAlias = "Holds | Do | Marked | Mark | All | First | Together | Sub
 
 
 def behavior_tree(problem: Problem, plan: Plan) -> Subtree:
-    """Return the behaviour tree of a plan.
-
-    Parameters
-    ----------
-    problem : Problem
-        The problem whose initial state is the state before the plan.
-    plan : Plan
-        A plan that `confab.planner.validation.validate` accepts.
-    """
+    """Return the behaviour tree of a valid plan, which begins in the problem's initial state."""
     tree = _TreeBuilder(problem, plan)
     goal = Holds((*(Fact(symbol, value) for symbol, value in sorted(problem.goal.items())), *tree.at_rest()))
     marking = Subtree("completed steps", All(tree.marks()))
@@ -269,5 +261,4 @@ class Situation:
 
     def can(self, step: Step) -> bool:
         """Return whether the preconditions of a primitive hold."""
-        behavior = self.problem.domain.behaviors[step.behavior]
-        return successor(self.problem, behavior, step.arguments, self.state) is not None
+        return followed(self.problem, [step], self.state) is not None

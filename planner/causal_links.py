@@ -12,9 +12,11 @@ square of the plan's length.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum
 from fractions import Fraction
+from typing import TypeVar
 
 from confab.planner.checked_conditions import Arguments
 from confab.planner.plan import Plan, Step
@@ -24,6 +26,7 @@ from confab.reasoner.limits import check
 from confab.reasoner.symbols import FALSE, TRUE, Condition, Fact, Problem, Symbol, ValueCondition, substituted
 
 Path = tuple[int, ...]
+T = TypeVar("T")
 
 
 class NeedKind(Enum):
@@ -71,14 +74,7 @@ class Purpose:
 
 
 def purposes(problem: Problem, plan: Plan) -> dict[Path, Purpose]:
-    """Return the purpose of every step, by its path.
-
-    Parameters
-    ----------
-    problem : Problem
-    plan : Plan
-        A plan in which `confab.planner.validation.validate` finds no fault.
-    """
+    """Return the purpose of every step of a valid plan, by its path."""
     gives: dict[Path, tuple[FactChange, ...]] = {}
     needs: dict[Path, list[Need]] = {step.path: [] for step in plan.walk()}
     for level in sorted({step.level for step in plan.walk()}):
@@ -215,29 +211,52 @@ class _LevelExecution:
         self, step: Step
     ) -> Iterator[tuple[int, tuple[FactChange, ...], tuple[Condition, ...], frozenset[Cell]]]:
         """Yield the steps that a step needs, with the conditions or symbols that would differ without the needed step."""
-        facts = self.facts
-        facts.cells, facts.of_value = {}, {}
-        before = self.changes(step) or {}
-        read = dict.fromkeys(cell for cell in facts.cells if cell in self.written)
-        for wanted in facts.of_value:
-            read.update(self.having.get(wanted, {}))
+        before, read = self.with_reads(lambda: self.changes(step) or {})
         given: list[FactChange] = []
         for cell, value in before.items():
-            if (old := facts.value(*cell)) is not None and old != value:
+            if (old := self.facts.value(*cell)) is not None and old != value:
                 given.append(FactChange(Fact(Symbol(*cell), value), old))
         self.gives[step.path] = tuple(given)
         bound = [self.bindings(one) for one, _ in self.in_turn(step)]
+        for writer, without in self.writers_that_matter(
+            read, lambda cells: self.failures_without(step, cells, before, bound)
+        ):
+            yield writer, *without
+
+    def with_reads(self, result: Callable[[], T]) -> tuple[T, dict[Cell, None]]:
+        """Return a result of the current state, and the written symbols that its calculation reads."""
+        self.facts.cells, self.facts.of_value = {}, {}
+        found = result()
+        read = dict.fromkeys(cell for cell in self.facts.cells if cell in self.written)
+        for wanted in self.facts.of_value:
+            read.update(self.having.get(wanted, {}))
+        return found, read
+
+    def writers_that_matter(
+        self, read: Iterable[Cell], without: Callable[[Sequence[Cell]], T | None]
+    ) -> Iterator[tuple[int, T]]:
+        """Yield the steps without whose changes of some symbols a result would differ, with the values of `without`.
+
+        The symbols that a step has written are tested one by one, and together if none of them matters alone.
+        """
         by: dict[int, list[Cell]] = {}
         for cell in read:
             by.setdefault(self.written[cell].by, []).append(cell)
         for writer, cells in sorted(by.items()):
-            alone = [
-                found for cell in cells if (found := self.failures_without(step, [cell], before, bound)) is not None
-            ]
-            if not alone and len(cells) > 1:
-                alone = [found for found in (self.failures_without(step, cells, before, bound),) if found is not None]
-            for changes, conditions, differs in alone:
-                yield writer, changes, conditions, differs
+            found = [one for cell in cells if (one := without([cell])) is not None]
+            if not found and len(cells) > 1:
+                found = [one for one in [without(cells)] if one is not None]
+            yield from ((writer, one) for one in found)
+
+    @contextmanager
+    def reset(self, cells: Iterable[Cell]) -> Iterator[tuple[FactChange, ...]]:
+        """Give some symbols their previous values while the context is active; the context's value are their changes."""
+        mark = len(self.facts.log)
+        now = {cell: Fact(Symbol(*cell), str(self.facts.value(*cell))) for cell in cells}
+        for cell in cells:
+            self.facts.put(*cell, self.written[cell].before)
+        yield tuple(FactChange(fact, self.written[cell].before) for cell, fact in now.items())
+        self.facts.undo(mark)
 
     def bindings(self, step: Step) -> Mapping[str, str]:
         """Return the individuals of the parameters of a step, and of its variables in the current state."""
@@ -254,30 +273,21 @@ class _LevelExecution:
         step.
         """
         check("explaining the plan")
-        facts, mark = self.facts, len(self.facts.log)
-        now = {cell: str(facts.value(*cell)) for cell in cells}
-        for cell in cells:
-            facts.put(*cell, self.written[cell].before)
         after: dict[Cell, str] | None = {}
         broken: list[Condition] = []
-        for (one, made), terms in zip(self.in_turn(step), bound, strict=False):
-            after = None if after is None or made is None else after | made
-            if made is None:
-                preconditions = self.problem.domain.behaviors[one.behavior].preconditions
-                grounded = [substituted(condition, terms) for condition in preconditions]
-                broken = [c for c in grounded if self.rules.satisfied([c], {}, {}, facts) is None]
-        for cell, value in now.items():
-            facts.put(*cell, value)
-        del facts.log[mark:]
-        changes = tuple(
-            FactChange(Fact(Symbol(*cell), value), self.written[cell].before) for cell, value in now.items()
-        )
+        with self.reset(cells) as changes:
+            for (one, made), terms in zip(self.in_turn(step), bound, strict=False):
+                after = None if after is None or made is None else after | made
+                if made is None:
+                    preconditions = self.problem.domain.behaviors[one.behavior].preconditions
+                    grounded = [substituted(condition, terms) for condition in preconditions]
+                    broken = [c for c in grounded if self.rules.satisfied([c], {}, {}, self.facts) is None]
         if after is None:
             return changes, tuple(broken), frozenset()
         differs = frozenset(
             cell
             for cell, value in before.items()
-            if after.get(cell) != value and (cell not in now or self.counted(cell))
+            if after.get(cell) != value and (cell not in cells or self.counted(cell))
         )
         return (changes, (), differs) if differs else None
 
@@ -337,37 +347,15 @@ class _LevelExecution:
         """
         if cell[0] not in self.problem.domain.rules:
             return
-        facts = self.facts
-        facts.cells, facts.of_value = {}, {}
-        facts.value(*cell)
-        read = dict.fromkeys(other for other in facts.cells if other in self.written)
-        for held in facts.of_value:
-            read.update(self.having.get(held, {}))
-        condition = ValueCondition(cell[0], cell[1], TRUE, wanted == FALSE)
-        by: dict[int, list[Cell]] = {}
-        for other in read:
-            by.setdefault(self.written[other].by, []).append(other)
-        for writer, cells in sorted(by.items()):
-            alone = [changes for one in cells if (changes := self.changes_that_matter(cell, wanted, [one]))]
-            if not alone and len(cells) > 1:
-                alone = [changes for changes in (self.changes_that_matter(cell, wanted, cells),) if changes]
-            for changes in alone:
-                yield self.steps[writer].path, Need(NeedKind.GOAL, changes, (), (condition,))
+        _, read = self.with_reads(lambda: self.facts.value(*cell))
 
-    def changes_that_matter(self, cell: Cell, wanted: str, cells: Sequence[Cell]) -> tuple[FactChange, ...]:
-        """Return the changes of `cells` if a defined situation would differ without these changes.
+        def lacking(cells: Sequence[Cell]) -> tuple[FactChange, ...] | None:
+            with self.reset(cells) as changes:
+                return changes if self.facts.value(*cell) != wanted else None
 
-        Otherwise return no changes.
-        """
-        facts, mark = self.facts, len(self.facts.log)
-        now = {other: str(facts.value(*other)) for other in cells}
-        for other in cells:
-            facts.put(*other, self.written[other].before)
-        lacking = facts.value(*cell) != wanted
-        for other, had in now.items():
-            facts.put(*other, had)
-        del facts.log[mark:]
-        return tuple(FactChange(Fact(Symbol(*o), v), self.written[o].before) for o, v in now.items()) if lacking else ()
+        for writer, changes in self.writers_that_matter(read, lacking):
+            condition = ValueCondition(cell[0], cell[1], TRUE, wanted == FALSE)
+            yield self.steps[writer].path, Need(NeedKind.GOAL, changes, (), (condition,))
 
     def fact_of(self, number: int, cell: Cell) -> Fact | None:
         """Return the fact that a step makes true for a symbol."""

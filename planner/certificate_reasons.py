@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
-from confab.planner.certificate_checks import Cases, CaseView, Claims, own_variables, unified
+from confab.planner.certificate_checks import Cases, CaseView, Claims
 from confab.planner.certificates import Certificate
-from confab.planner.checked_conditions import variables
+from confab.planner.checked_conditions import own_variables, unified, variables
 from confab.planner.plan import Reason
-from confab.planner.possibilities import ANYTHING, FactEvaluation, Lowest, Range, WorkLimitError, compared
-from confab.reasoner.amounts import MORE, Expression, bounds, terms_of, towards, written
+from confab.planner.possibilities import (
+    ANYTHING,
+    OPERATORS,
+    FactEvaluation,
+    Lowest,
+    Range,
+    WorkLimitError,
+    calculated,
+    compared,
+)
+from confab.reasoner.amounts import MORE, bounds, terms_of, towards, written
 from confab.reasoner.sentences import an, said
 from confab.reasoner.symbols import (
     FALSE,
@@ -71,34 +81,33 @@ class Cause:
 
 def told(problem: Problem, certificate: Certificate) -> Reason:
     """Return the reason, read from a certificate, why a problem has no plan."""
-    goals = [*certificate.unmet[:SHOWN]]
-    terms = [word for fact in goals for word in _words(fact)]
+    goals, causes = certificate.unmet[:SHOWN], _Causes(problem, certificate)
+    what, many = " and ".join(map(str, goals)) + " …" * (len(certificate.unmet) > SHOWN), len(goals) > 1
+    how, more = "exclude each other" if many else "can't be reached", tuple[str, ...]()
     if certificate.told_apart:
-        what = " and ".join(map(str, goals)) + " …" * (len(certificate.unmet) > SHOWN)
-        symbols = sorted(certificate.told_apart)
-        about = ", ".join(map(str, symbols[:SHOWN])) + f" and {len(symbols) - SHOWN} more" * (len(symbols) > SHOWN)
-        one, many = certificate.cases == 1, len(goals) > 1
-        how = "exclude each other" if many else "can't be reached"
-        values = {(fact.symbol.situation, fact.value) for fact in goals}
-        if certificate.kind == "pair" and len(goals) == 2 and len(values) == 1 and goals[0].value not in (TRUE, FALSE):
-            return Reason(f"{what} {how}: no reachable state has both", tuple(dict.fromkeys(terms)))
-        which = "the only reachable combination" if one else f"none of the {certificate.cases} reachable combinations"
-        has = "doesn't contain" if one else "contains"
-        text = f"{what} {how}: {which} of values of {about} {has} {'all of these goals' if many else 'this goal'}"
-        return Reason(text, tuple(dict.fromkeys(terms)))
-    causes = _Causes(problem, certificate)
-    if certificate.bounded or len(goals) > 1:
-        what = " and ".join(map(str, goals)) + " …" * (len(certificate.unmet) > SHOWN)
-        try:
+        text = f"{what} {how}: {_of_cases(certificate)}"
+    elif certificate.bounded or many:
+        why = ""
+        with suppress(WorkLimitError, RecursionError):
             why, more = causes.excluded()
-        except (WorkLimitError, RecursionError):
-            why, more = "", ()
-        how = f"exclude each other{why}" if len(goals) > 1 else f"can't hold{why}"
-        return Reason(f"{what} {how}", tuple(dict.fromkeys((*terms, *more))))
-    goal = certificate.unmet[0]
-    why, more = causes.why(Claim(goal))
-    named = dict.fromkeys(word for word in (*terms, *more) if not word.startswith("?"))
-    return Reason(f"{goal} can't be reached: {why}", tuple(named))
+        text = what + (" exclude each other" if many else " can't hold") + why
+    else:
+        why, named = causes.why(Claim(goals[0]))
+        text, more = f"{what} {how}: {why}", tuple(word for word in named if not word.startswith("?"))
+    return Reason(text, tuple(dict.fromkeys((*(word for fact in goals for word in _words(fact)), *more))))
+
+
+def _of_cases(certificate: Certificate) -> str:
+    """Return as text that no reachable combination of values contains the goals."""
+    goals, symbols = certificate.unmet[:SHOWN], sorted(certificate.told_apart)
+    values = {(fact.symbol.situation, fact.value) for fact in goals}
+    if certificate.kind == "pair" and len(goals) == 2 and len(values) == 1 and goals[0].value not in (TRUE, FALSE):
+        return "no reachable state has both"
+    about = ", ".join(map(str, symbols[:SHOWN])) + f" and {len(symbols) - SHOWN} more" * (len(symbols) > SHOWN)
+    wanted = "all of these goals" if len(goals) > 1 else "this goal"
+    if certificate.cases == 1:
+        return f"the only reachable combination of values of {about} doesn't contain {wanted}"
+    return f"none of the {certificate.cases} reachable combinations of values of {about} contains {wanted}"
 
 
 def _listed(claims: Sequence[Claim]) -> str:
@@ -239,12 +248,9 @@ class _Causes:
                     continue
                 own = own_variables(behavior).union(*(variables(condition) for condition in effect.when))
                 terms = (*effect.arguments, None if amount else getattr(effect, "value", None))
-                boolean_or_set = fact.value if not amount else None
-                if kept:  # any other value would make the claim false
-                    if terms[-1] == fact.value:
-                        continue
-                    boolean_or_set = None
-                words = (*symbol.arguments, boolean_or_set)
+                if kept and terms[-1] == fact.value:  # any other value would make the claim false
+                    continue
+                words = (*symbol.arguments, None if amount or kept else fact.value)
                 bound = unified(
                     self.problem, behavior, own, terms, tuple(None if word in free else word for word in words)
                 )
@@ -268,11 +274,10 @@ class _Causes:
                 ]
                 found.append(self.lacking(claim, behavior, (*behavior.preconditions, *effect.when, *classes), bound))
         found = [cause for cause in found if cause.text]
-        if amount and not found and fact.value != self.certificate.always.get(symbol):
-            return [Cause(f"no behaviour of level {lowest.level} gives {self.direction(fact)}")]
+        if amount and not found and fact.value == self.certificate.always.get(symbol):
+            return [Cause(f"{_named(symbol)} is always {fact.value}")]
         if amount and not found:
-            stays = self.certificate.always.get(symbol)
-            return [Cause(f"{_named(symbol)} is always {stays}" if stays else self.bounds_of(symbol))]
+            return [Cause(f"no behaviour of level {lowest.level} gives {self.direction(fact)}")]
         if not found:
             what = (
                 f"gives {_named(symbol)} another value"
@@ -284,26 +289,10 @@ class _Causes:
 
     def exceeded(self, fact: Fact) -> str:
         """Return as text the bound that a goal value exceeds, or an empty text if the value is within bounds."""
-        quantity, words = (
-            self.lowest.quantity(fact.symbol.situation),
-            _named(fact.symbol),
-        )
-        if quantity is None:
+        if self.lowest.quantity(fact.symbol.situation) is None:
             return ""
-        for sign, limit in bounds(fact.value):
-            if (
-                quantity.most is not None
-                and sign[0] != "<"
-                and (limit > quantity.most or (limit, sign) == (quantity.most, ">"))
-            ):
-                return f"{words} is at most {written(quantity.most)}"
-            if (
-                quantity.least is not None
-                and sign[0] != ">"
-                and (limit < quantity.least or (limit, sign) == (quantity.least, "<"))
-            ):
-                return f"{words} is at least {written(quantity.least)}"
-        return ""
+        found = _end_before(self.lowest.bounds_of(fact.symbol.situation), fact.value)
+        return f"{_named(fact.symbol)} is at {found[0]} {written(found[1])}" if found else ""
 
     def too_much(self, fact: Fact) -> Cause | None:
         """Return the range of a sum or count as a cause, if no number in the range satisfies a goal; otherwise None."""
@@ -311,15 +300,13 @@ class _Causes:
         if aggregate is None or not aggregate.kept:
             return None
         reading, view = self.reading()
-        total, words = reading.total(aggregate, fact.symbol.arguments), _named(fact.symbol)
+        found = _end_before(reading.total(aggregate, fact.symbol.arguments), fact.value)
+        if found is None:
+            return None
         what = "count of all individuals" if aggregate.function == "count" else "sum of all numbers"
-        for sign, limit in bounds(fact.value):
-            if not compared(total, sign, Range(limit, limit), must=False):
-                most = limit > total.high or (limit == total.high and sign[0] == ">")
-                end, bound = ("most", total.high) if most else ("least", total.low)
-                text = f"{words} is at {end} {written(Fraction(bound))}, the {what} that {'may' if most else 'must'} belong to it"
-                return Cause(text, (*fact.symbol.arguments, fact.symbol.situation), tuple(map(Claim, view.claimed)))
-        return None
+        may = "may" if found[0] == "most" else "must"
+        text = f"{_named(fact.symbol)} is at {found[0]} {written(found[1])}, the {what} that {may} belong to it"
+        return Cause(text, (*fact.symbol.arguments, fact.symbol.situation), tuple(map(Claim, view.claimed)))
 
     def direction(self, fact: Fact) -> str:
         """Return `MORE` or `LESS`: the direction in which an amount must change to satisfy its goal."""
@@ -330,18 +317,12 @@ class _Causes:
         if fact.value == self.certificate.always.get(fact.symbol) or not isinstance(effect, AmountEffect):
             return True
         reading, _ = self.reading()
-        by = reading.expression(effect.amount, given) if variables_of(effect.amount) <= given.keys() else ANYTHING
+        known = all(term in given for term in terms_of(effect.amount) if term.startswith("?"))
+        by = reading.expression(effect.amount, given) if known else ANYTHING
         if by is None or effect.operation not in ("increase", "decrease"):
             return True
         more = (self.direction(fact) == MORE) is (effect.operation == "increase")
         return by.high > 0 if more else by.low < 0
-
-    def bounds_of(self, symbol: Symbol) -> str:
-        """Return the bounds of an amount as text."""
-        allowed, words = self.claims.lowest.allowed(symbol), _named(symbol)
-        least = "" if isinstance(allowed.low, float) else f" at least {written(allowed.low)}"
-        most = "" if isinstance(allowed.high, float) else f" at most {written(allowed.high)}"
-        return f"{words} is always{least}{' and' if least and most else ''}{most}" if least or most else words
 
     def too_few(self, rule: Rule, given: dict[str, str]) -> Cause | None:
         """Return a cause if a behaviour or rule requires more individuals than can exist."""
@@ -434,21 +415,17 @@ class _Causes:
         return Cause("")
 
     def beyond(
-        self, reading: FactEvaluation, env: dict[str, str], effect: Effect
+        self, reading: FactEvaluation, env: dict[str, str], effect: AmountEffect
     ) -> Iterator[tuple[str, tuple[str, ...]]]:
         """Yield as text how an effect would violate the bounds of an amount."""
-        from confab.planner.possibilities import OPERATORS, calculated
-
         symbol = Symbol(effect.situation, tuple(env.get(a, a) for a in effect.arguments))
         quantity = self.lowest.quantity(effect.situation)
         old = reading.between(effect.situation, symbol.arguments)
-        by = reading.expression(effect.amount, env)  # type: ignore[union-attr]
+        by = reading.expression(effect.amount, env)
         if quantity is None or old is None:
             return
-        words = _named(symbol)
-        terms = (*symbol.arguments, symbol.situation)
-        operation = effect.operation  # type: ignore[union-attr]
-        new = by if by is None or operation == "assign" else calculated(OPERATORS[operation], old, by)
+        words, terms = _named(symbol), (*symbol.arguments, symbol.situation)
+        new = by if by is None or effect.operation == "assign" else calculated(OPERATORS[effect.operation], old, by)
         constraint = self.problem.domain.constraints.get(symbol.situation)
         if constraint is not None:
             yield f"violate the constraint that {constraint}", (constraint.situation,)
@@ -506,11 +483,6 @@ def false_equality(condition: Condition) -> bool:
     return condition.negated if left == right else not condition.negated and "?" not in (left[0], right[0])
 
 
-def variables_of(expression: Expression) -> set[str]:
-    """Return the variables in an expression."""
-    return {term for term in terms_of(expression) if term.startswith("?")}
-
-
 def counted(condition: Condition | None) -> tuple[int, str, tuple[Condition, ...]]:
     """Return the number of different individuals that a condition requires, their class, and their common conditions."""
     before: list[str] = []
@@ -554,6 +526,15 @@ class _ClaimRecorder(CaseView):
         if always is not None:
             self.claimed[Fact(symbol, always)] = None
         return super().between(symbol)
+
+
+def _end_before(found: Range, wanted: str) -> tuple[str, Fraction] | None:
+    """Return the end of a range, most or least, that lies before a goal, or None if a number in the range satisfies the goal."""
+    for sign, limit in bounds(wanted):
+        if not compared(found, sign, Range(limit, limit), must=False):
+            most = limit > found.high or (limit == found.high and sign[0] == ">")
+            return ("most", Fraction(found.high)) if most else ("least", Fraction(found.low))
+    return None
 
 
 def _named(symbol: Symbol) -> str:

@@ -21,16 +21,9 @@ ADDED_UP = 200_000
 
 
 def certified(problem: Problem, outcome: Outcome) -> Outcome:
-    """Return an outcome "unsolvable" unchanged if the checker accepts its certificate.
+    """Return an outcome of planning the whole task; "unsolvable" becomes "gave up" if the checker accepts no certificate.
 
-    Otherwise return the outcome "gave up".
-
-    Parameters
-    ----------
-    problem : Problem
-        The whole task.
-    outcome : Outcome
-        A certificate that the outcome already has is checked first.
+    A certificate that the outcome already has is checked first.
     """
     if outcome.status is not Status.UNSOLVABLE:
         return outcome

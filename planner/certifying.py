@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from fractions import Fraction
 from functools import partial
 from itertools import combinations, pairwise, product
 from math import prod
@@ -34,16 +35,14 @@ from confab.planner.certificate_checks import (
     ClaimCase,
     Try,
     is_bounded,
-    own_variables,
-    unified,
     wanted_in_the_end,
 )
 from confab.planner.certificates import Certificate
-from confab.planner.checked_conditions import variables
+from confab.planner.checked_conditions import own_variables, unified, variables
 from confab.planner.possibilities import FactEvaluation, Lowest, NoTimeLeftError, Range, WorkLimitError
 from confab.planner.validation import BehaviorReader, LoggedState
 from confab.reasoner.amounts import meets, number, written
-from confab.reasoner.symbols import FALSE, TRUE, AmountEffect, Behavior, Effect, Fact, Problem, State, Symbol
+from confab.reasoner.symbols import FALSE, TRUE, Behavior, Effect, Fact, Problem, State, Symbol
 
 WORK = 3_000_000
 """Maximum work to find a certificate: the number of tested conditions plus the number of behaviours that are tried in cases."""
@@ -60,9 +59,9 @@ PAIR, FEWER, SHARE = 100_000, 200_000, 0.5
 FEW = 3
 """Maximum number of distinguished values of a symbol; if more are needed, all its values are distinguished."""
 ReachabilityQuestion: TypeAlias = "tuple[str, Symbol, str]"
-"""Kinds of questions about reachability: can a symbol get a value (`GETS`), can a symbol lose its value, or an amount
-change (`LEAVES`), can a condition on the final state hold (`ENDS`)?"""
-GETS, LEAVES, ENDS = "gets", "leaves", "ends"
+"""Kinds of questions about reachability: can a symbol get a value (`GETS`), can a symbol lose its value (`LEAVES`), which amounts
+can a symbol get (`RANGE`), can a condition on the final state hold (`ENDS`)?"""
+GETS, LEAVES, RANGE, ENDS = "gets", "leaves", "range", "ends"
 KINDS = ("facts", "bounds", "pairs", "cases", "states")
 """Kinds of certificates: unreachable facts; goals that exclude each other in every state; two goals that exclude each other;
 distinguished values; all values."""
@@ -201,7 +200,7 @@ class Relaxed:
         if symbol.situation in self.problem.domain.aggregates:
             return self.lowest.allowed(symbol)
         first = self.lowest.initial(symbol)
-        self._ask((LEAVES, symbol, first))
+        self._ask((RANGE, symbol, first))
         return self.ranges.get(symbol, Range(number(first), number(first)))
 
     def _ask(self, key: ReachabilityQuestion) -> bool:
@@ -222,47 +221,31 @@ class Relaxed:
         while self._waiting and key not in self.possible:
             one = next(iter(self._waiting))
             del self._waiting[one]
-            if self._news(one):
+            if one not in self.possible and self._examined(one):
+                if one[0] != RANGE:
+                    self.possible.add(one)
                 self._waiting.update(self._readers[one])
         return key in self.possible
 
-    def look(self, key: ReachabilityQuestion) -> FactEvaluation:
-        """Return the reader of conditions for one question.
+    def _examined(self, key: ReachabilityQuestion) -> bool:
+        """Return whether the answer to a question is yes, or the range of an amount wider, according to the present knowledge.
 
         `reads` records the other questions on which the answer depends.
         """
-        self._asking, self.reads = key, {}
-        return FactEvaluation(self.lowest, self)
-
-    def _news(self, key: ReachabilityQuestion) -> bool:
-        """Examine a question again.
-
-        Return whether its answer has changed to possible, or to a wider range of an amount.
-        """
-        kind, symbol, _ = key
-        reading = self.look(key)
-        if kind == LEAVES and self.lowest.quantity(symbol.situation) is not None:
-            return self._wider(reading, symbol)
-        if key in self.possible or not self.brought_about(reading, key):
-            return False
-        self.possible.add(key)
-        return True
-
-    def brought_about(self, reading: FactEvaluation, key: ReachabilityQuestion) -> bool:
-        """Return whether the answer to a question is yes according to the present knowledge."""
         kind, symbol, value = key
+        self._asking, self.reads = key, {}
+        reading = FactEvaluation(self.lowest, self)
         if kind == ENDS:
             return reading.goal(symbol, value)
-        return any(self.possible_ways(reading, symbol, value, other=kind == LEAVES))
-
-    def possible_ways(self, reading: FactEvaluation, symbol: Symbol, value: str, other: bool) -> Iterator[Try]:
-        """Yield the behaviours, with individuals, that may give a symbol a value (or, with `other`, a different value)."""
+        if kind == RANGE:
+            return self._wider(reading, symbol)
         for behavior, effect in self.lowest.effects.get(symbol.situation, ()):
-            words = (*symbol.arguments, None if other else value)
+            words = (*symbol.arguments, value if kind == GETS else None)
             for env in self._envs(reading, behavior, effect, (*effect.arguments, effect.value), words):
                 becomes = env.get(effect.value, effect.value)
-                if (becomes != value) == other and reading.amounts(behavior, env) is not None:
-                    yield Try(behavior, env)
+                if (becomes == value) is (kind == GETS) and reading.amounts(behavior, env) is not None:
+                    return True
+        return False
 
     def _envs(
         self,
@@ -282,22 +265,20 @@ class Relaxed:
     def _wider(self, reading: FactEvaluation, symbol: Symbol) -> bool:
         first = number(self.lowest.initial(symbol))
         before = now = self.ranges.get(symbol, Range(first, first))
-        quantity = self.lowest.quantity(symbol.situation)
-        least = -float("inf") if quantity is None or quantity.least is None else quantity.least
-        most = float("inf") if quantity is None or quantity.most is None else quantity.most
+        limits = self.lowest.bounds_of(symbol.situation)
         for behavior in self.lowest.behaviors:
             for effect in behavior.amounts:
                 if effect.situation != symbol.situation:
                     continue
-                constant = effect.operation == "assign" and not isinstance(effect, str) and _number(effect)
+                constant = effect.operation == "assign" and isinstance(effect.amount, Fraction)
                 for env in self._envs(reading, behavior, effect, effect.arguments, symbol.arguments):
                     after = (reading.amounts(behavior, env) or {}).get(symbol)
                     if after is None:
                         continue
                     low, high = after[0].low, after[0].high
                     if not constant:  # widen the range in one step to the farthest reachable amount
-                        low = min(least, now.low) if low < now.low else low
-                        high = max(most, now.high) if high > now.high else high
+                        low = min(limits.low, now.low) if low < now.low else low
+                        high = max(limits.high, now.high) if high > now.high else high
                     now = now.hull(Range(low, high))
         self.ranges[symbol] = now
         return now != before
@@ -323,42 +304,26 @@ class Relaxed:
                 continue
             seen.add(key)
             kind, symbol, value = key
-            amount = self.lowest.quantity(symbol.situation) is not None
+            if kind == RANGE and not (value := self._bounds(symbol)):
+                continue  # the symbol may have any allowed amount
             if kind == GETS:
                 never.add(Fact(symbol, value))
-            elif kind == LEAVES and not amount:
+            elif kind != ENDS:
                 always[symbol] = value
-            elif kind == LEAVES:
-                text = self._bounds(symbol)
-                if not text:
-                    continue  # the symbol may have any allowed amount
-                always[symbol] = text
-            reading = self.look(key)
-            if kind == LEAVES and amount:
-                self._wider(reading, symbol)
-            else:
-                self.brought_about(reading, key)
+            self._examined(key)
             waiting += self.reads
         return never, always
 
     def _bounds(self, symbol: Symbol) -> str:
         first = number(self.lowest.initial(symbol))
-        found, quantity = self.ranges.get(symbol, Range(first, first)), self.lowest.quantity(symbol.situation)
+        found, limits = self.ranges.get(symbol, Range(first, first)), self.lowest.bounds_of(symbol.situation)
         if not isinstance(found.low, float) and found.low == found.high:
             return written(found.low)
-        least = None if quantity is None else quantity.least
-        most = None if quantity is None else quantity.most
         parts = [
-            f">={written(found.low)}" if not isinstance(found.low, float) and found.low != least else "",
-            f"<={written(found.high)}" if not isinstance(found.high, float) and found.high != most else "",
+            f">={written(found.low)}" if not isinstance(found.low, float) and found.low != limits.low else "",
+            f"<={written(found.high)}" if not isinstance(found.high, float) and found.high != limits.high else "",
         ]
         return ",".join(part for part in parts if part)
-
-
-def _number(effect: AmountEffect) -> bool:
-    return not isinstance(effect.amount, tuple) and not hasattr(effect.amount, "arguments") and not hasattr(
-        effect.amount, "operator"
-    )  # fmt: skip
 
 
 # ----------------------------------------------------------------------------------------------- certificates with cases
@@ -539,8 +504,8 @@ def _refined(cases: Cases, end: ClaimCase, relaxed: Relaxed, goal: State) -> Cer
         if changes is None or not _is(cases, facts, after, bool(wrong)):
             return _told_apart(cases, relaxed, wrong or view.unknown or [])
     goals = [Fact(symbol, wanted) for symbol, wanted in sorted(goal.items())]
-    open_ = [fact for fact in goals if not _met(problem, facts, fact)]
-    rests = [] if open_ else _restless(problem, lowest.level, facts)
+    open_ = [f for f in goals if not meets(facts.value(f.symbol.situation, f.symbol.arguments) or FALSE, f.value)]
+    rests = [] if open_ else _restless(problem, facts)
     for fact in open_ or rests:
         if fact in cases.certificate.unmet:
             view = CaseView(cases.claims, path[0][2] if path else end, unknown=[])
@@ -573,11 +538,7 @@ def _is(cases: Cases, facts: LoggedState, case: ClaimCase, exactly: bool) -> boo
     return True
 
 
-def _met(problem: Problem, facts: LoggedState, fact: Fact) -> bool:
-    return meets(facts.value(fact.symbol.situation, fact.symbol.arguments) or FALSE, fact.value)
-
-
-def _restless(problem: Problem, level: int, facts: LoggedState) -> list[Fact]:
+def _restless(problem: Problem, facts: LoggedState) -> list[Fact]:
     """Return the rest values, or initial values, that a final state must have and that the given state doesn't have."""
     found = []
     for symbol, now in sorted(facts.state().items()):

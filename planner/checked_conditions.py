@@ -14,6 +14,7 @@ from confab.reasoner.amounts import terms_of
 from confab.reasoner.symbols import (
     FALSE,
     AnyOf,
+    Behavior,
     ClassCondition,
     Comparison,
     Condition,
@@ -241,3 +242,33 @@ def variables(condition: Condition) -> set[str]:
         case _:
             terms = set()
     return {term for term in terms if term.startswith("?")}
+
+
+def own_variables(behavior: Behavior) -> frozenset[str]:
+    """Return the parameters of a behaviour and the variables that its preconditions determine."""
+    found = {parameter.name for parameter in behavior.parameters}
+    return frozenset(found.union(*(variables(condition) for condition in behavior.preconditions)))
+
+
+def unified(
+    problem: Problem,
+    behavior: Behavior,
+    own: frozenset[str],
+    terms: tuple[str | None, ...],
+    words: tuple[str | None, ...],
+) -> dict[str, str] | None:
+    """Return the bindings of a behaviour's variables that make the terms of an effect equal to the given words.
+
+    Return None if there are no such bindings. A word that is None matches any term.
+    """
+    found: dict[str, str] = {}
+    for term, word in zip(terms, words, strict=True):
+        if term is None or word is None:
+            continue
+        kind = behavior.kinds.get(term)
+        if kind is None:
+            if term != word:
+                return None
+        elif word not in problem.members(kind) or (term in own and found.setdefault(term, word) != word):
+            return None
+    return found

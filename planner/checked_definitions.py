@@ -26,13 +26,8 @@ def stratum_of(rules: Mapping[str, Sequence[Rule]]) -> dict[str, tuple[str, ...]
 class DefinedValues:
     """Values of defined situations, computed on demand and cached until `forget` is called.
 
-    Parameters
-    ----------
-    strata : mapping of situation type to its stratum
-        The result of `stratum_of`.
-    given : function of a situation type and arguments to a truth value
-        Function that returns whether one of the rules derives the symbol; rules read other defined situations by calling
-        `follows`.
+    `strata` is the result of `stratum_of`. `given` returns whether one of the rules derives a symbol; rules read other defined
+    situations by calling `follows`.
     """
 
     def __init__(self, strata: Mapping[str, tuple[str, ...]], given: Callable[[str, tuple[str, ...]], bool]) -> None:
@@ -72,13 +67,7 @@ class DefinedValues:
 
 
 class Total:
-    """A sum or count, calculated from its definition on each access.
-
-    Parameters
-    ----------
-    rules : Source
-        The context for reading conditions.
-    """
+    """A sum or count, calculated from its definition on each access."""
 
     def __init__(self, rules: Source, aggregate: Aggregate) -> None:
         reading = ConditionReader(rules, [p.name for p in aggregate.parameters])

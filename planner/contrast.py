@@ -19,7 +19,7 @@ from confab.planner.checked_conditions import Bindings
 from confab.planner.levels import failing_conditions
 from confab.planner.plan import Outcome, Plan, Reason, Step, renumbered
 from confab.planner.plan_costs import cost_of
-from confab.planner.validation import BehaviorReader, LoggedState, successor, validate
+from confab.planner.validation import BehaviorReader, LoggedState, followed, successor, validate
 from confab.reasoner.amounts import Amount
 from confab.reasoner.symbols import (
     AnyOf,
@@ -122,9 +122,7 @@ def instead_of(
     step, why = _refined(problem, states[at], behavior, arguments, ask)
     if step is None:
         return replace(asked, reason=why)
-    after = states[at]
-    for primitive in Plan((step,)).primitives:
-        after = successor(problem, problem.domain.behaviors[primitive.behavior], primitive.arguments, after) or after
+    after = followed(problem, Plan((step,)).primitives, states[at]) or states[at]
     rest = ask(_from(problem, behavior.level, after))
     if rest.plan is None:
         return replace(asked, reason=rest.reason)
@@ -202,12 +200,7 @@ def _states(problem: Problem, course: Sequence[Step]) -> list[State]:
     """Return the state before each of some steps."""
     states = [problem.initial]
     for step in course[:-1]:
-        state = states[-1]
-        for primitive in Plan((step,)).primitives:
-            state = (
-                successor(problem, problem.domain.behaviors[primitive.behavior], primitive.arguments, state) or state
-            )
-        states.append(state)
+        states.append(followed(problem, Plan((step,)).primitives, states[-1]) or states[-1])
     return states
 
 

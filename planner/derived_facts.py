@@ -12,13 +12,7 @@ from confab.reasoner.symbols import FALSE, TRUE
 
 
 class CompiledRules:
-    """The rules of a problem as Python, compiled once for all tables.
-
-    Parameters
-    ----------
-    writer : PythonWriter
-        The writer of generated code for the problem.
-    """
+    """The rules of a problem as Python, compiled once for all tables."""
 
     def __init__(self, writer: PythonWriter) -> None:
         self.domain = writer.problem.domain

@@ -4,24 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from html import escape
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING
+
+from confab.planner.finding import Path, StepPosition
 
 if TYPE_CHECKING:
     import networkx
 
-Path: TypeAlias = "tuple[int, ...]"
 
-
-class StepEntry(NamedTuple):
-    """A step in a plan: its position in the tree, its label, its level and its ID."""
-
-    path: Path
-    label: str
-    level: int
-    id: int
-
-
-def digraph(nodes: Sequence[StepEntry]) -> networkx.DiGraph[Path]:
+def digraph(nodes: Sequence[StepPosition]) -> networkx.DiGraph[Path]:
     """Return a plan as a directed graph whose nodes are the paths of the steps.
 
     Nodes have the attributes ``label``, ``level`` and ``id``. The attribute ``kind`` of an edge is ``refines`` or ``then``.
@@ -30,13 +21,13 @@ def digraph(nodes: Sequence[StepEntry]) -> networkx.DiGraph[Path]:
 
     graph: networkx.DiGraph[Path] = networkx.DiGraph()
     for node in nodes:
-        graph.add_node(node.path, label=node.label, level=node.level, id=node.id)
+        graph.add_node(node.path, label=node.texts[-1], level=node.level, id=node.id)
     for one, other, kind in edges(nodes):
         graph.add_edge(one, other, kind=kind)
     return graph
 
 
-def edges(nodes: Sequence[StepEntry]) -> Iterator[tuple[Path, Path, str]]:
+def edges(nodes: Sequence[StepPosition]) -> Iterator[tuple[Path, Path, str]]:
     """Yield the edges of a plan's graph, each with its kind.
 
     An edge leads from a step to a sub-step (``refines``) or to the next step (``then``).
@@ -50,10 +41,10 @@ def edges(nodes: Sequence[StepEntry]) -> Iterator[tuple[Path, Path, str]]:
             yield path, following, "then"
 
 
-def dot(nodes: Sequence[StepEntry]) -> str:
+def dot(nodes: Sequence[StepPosition]) -> str:
     """Return a plan as Graphviz text: sub-steps are drawn below a step, and dashed arrows lead to the next step."""
     lines = ["digraph plan {", "  node [shape=box, style=rounded];"]
-    lines += [f"  {_named(node.path)} [label={_quoted(node.label)}];" for node in nodes]
+    lines += [f"  {_named(node.path)} [label={_quoted(node.texts[-1])}];" for node in nodes]
     style = {"refines": "", "then": " [style=dashed, constraint=false]"}
     lines += [f"  {_named(one)} -> {_named(other)}{style[kind]};" for one, other, kind in edges(nodes)]
     return "\n".join([*lines, "}"]) + "\n"
@@ -67,14 +58,14 @@ def _quoted(text: str) -> str:
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
-def html(headline: str, nodes: Sequence[StepEntry]) -> str:
+def html(headline: str, nodes: Sequence[StepPosition]) -> str:
     """Return a plan as HTML with a collapsible tree of steps."""
     above = {node.path[:-1] for node in nodes}
     parts, depth = [f"<div>{escape(headline)}"], 1
     for node in nodes:
         parts.append("</details>" * (depth - len(node.path)))
         depth = len(node.path)
-        own = escape(node.label)
+        own = escape(node.texts[-1])
         if node.path in above:
             parts.append(f"<details style='margin-left: 1.2em'><summary>{own}</summary>")
         else:

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 
-from confab.planner.checked_conditions import Bindings
+from confab.planner.checked_conditions import Bindings, unified
 from confab.planner.plan import Broken, Left, Plan, Step
 from confab.planner.validation import BehaviorReader, Cell, LoggedState, stretches
 from confab.reasoner.language import is_variable, mentions
@@ -36,14 +36,7 @@ MOST_LACKING = 4
 
 
 def levels_left(problem: Problem, plan: Plan) -> list[Left]:
-    """Return the runs of consecutive lower-level steps in a valid plan, each with the conditions that the run violates.
-
-    Parameters
-    ----------
-    problem : Problem
-    plan : Plan
-        A plan that `confab.planner.validation.validate` accepts.
-    """
+    """Return the runs of consecutive lower-level steps in a valid plan, each with the conditions that the run violates."""
     return list(_Watch(problem).carried_out(plan.steps, 0))
 
 
@@ -54,7 +47,12 @@ class _Watch:
         self.problem = problem
         self.rules = BehaviorReader(problem)
         self.facts = LoggedState(problem, problem.initial)
-        self.views = {level: LoggedState(problem, _seen(problem, level)) for level in problem.domain.levels}
+        self.views = {
+            level: LoggedState(
+                problem, {s: value for s, value in problem.initial.items() if problem.sees(level, s, value)}
+            )
+            for level in problem.domain.levels
+        }
         self.left: dict[int, list[Broken]] = {}  # the violations so far, by replaced level
         self.history: dict[
             int, list[tuple[Cell, str | None]]
@@ -103,35 +101,28 @@ class _Watch:
     def judged(self, level: int, step: Step, change: Fact) -> Iterator[Broken]:
         """Yield the violation of a change if no behaviour of the level could make the change in the current state."""
         best: Broken | None = None
+        view = self.views[level]
         for behavior in self.problem.domain.at_level(level):
             for effect in behavior.every_effect:
-                terms = self.unified(behavior, effect, change)
+                if effect.situation != change.symbol.situation:
+                    continue
+                value = (
+                    effect.value if isinstance(effect, ValueEffect) else None
+                )  # amounts are known only after execution
+                own, wanted = frozenset(behavior.kinds), (*change.symbol.arguments, change.value)
+                terms = unified(self.problem, behavior, own, (*effect.arguments, value), wanted)
                 if terms is None:
                     continue
                 if self.could(level, behavior, effect, terms, change):
                     return
                 most = None if best is None else len(best.conditions) - 1
-                found, asked = self.nearest(level, behavior, effect, terms, change.symbol, most)
+                conditions, views = (*behavior.preconditions, *effect.when), (self.mixed(level, change.symbol), view)
+                found, asked = failing_conditions(self.rules, conditions, terms, behavior.kinds, views, most)
                 arguments = tuple(found.get(p.name, p.name) for p in behavior.parameters)
                 if best is None or len(asked) < len(best.conditions):
                     text = f"{change}: {' '.join((behavior.name, *arguments))} requires that {' and '.join(map(said, asked))}"
                     best = Broken(step.path, change, behavior.name, arguments, asked, text)
         yield best or Broken(step.path, change, None, (), (), f"{change}: no behaviour of that level makes this change")
-
-    def unified(self, behavior: Behavior, effect: ValueEffect | AmountEffect, change: Fact) -> Bindings | None:
-        """Return the bindings with which an effect makes a change, or None if there are no such bindings."""
-        kinds, terms = behavior.kinds, dict[str, str]()
-        if effect.situation != change.symbol.situation:
-            return None
-        said, is_ = effect.arguments, change.symbol.arguments
-        if isinstance(effect, ValueEffect):  # the result of an amount is known only after execution
-            said, is_ = (*said, effect.value), (*is_, change.value)
-        for term, given in zip(said, is_, strict=True):
-            if terms.setdefault(term, given) != given or (term not in kinds and term != given):
-                return None
-            if term in kinds and given not in self.problem.members(kinds[term]):
-                return None
-        return {term: given for term, given in terms.items() if term in kinds}
 
     def could(
         self, level: int, behavior: Behavior, effect: ValueEffect | AmountEffect, terms: Bindings, change: Fact
@@ -167,23 +158,6 @@ class _Watch:
         values = self.facts.state()
         seen = self.views[level].value(symbol.situation, symbol.arguments)
         return LoggedState(self.problem, values if seen is None else {**values, symbol: seen})
-
-    def nearest(
-        self,
-        level: int,
-        behavior: Behavior,
-        effect: ValueEffect | AmountEffect,
-        terms: Bindings,
-        symbol: Symbol,
-        most: int | None = None,
-    ) -> tuple[Bindings, tuple[Condition, ...]]:
-        """Return bindings of a behaviour's variables, and the smallest set of failing conditions.
-
-        A set of more than `most` conditions may not be the smallest.
-        """
-        conditions = (*behavior.preconditions, *effect.when)
-        views = self.mixed(level, symbol), self.views[level]
-        return failing_conditions(self.rules, conditions, terms, behavior.kinds, views, most)
 
 
 def failing_conditions(
@@ -245,7 +219,3 @@ def _independent(conditions: Sequence[Condition], order: Sequence[int], terms: B
         joined, apart = [g for g in groups if g[0] & free], [g for g in groups if not g[0] & free]
         groups = [*apart, (free.union(*(g[0] for g in joined)), {number}.union(*(g[1] for g in joined)))]
     return [sorted(numbers, key=order.index) for _, numbers in groups]
-
-
-def _seen(problem: Problem, level: int) -> dict[Symbol, str]:
-    return {symbol: value for symbol, value in problem.initial.items() if problem.sees(level, symbol, value)}

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import networkx
     import pandas
 
-    from confab.planner.forms import StepEntry
+    from confab.planner.finding import StepPosition
 
 
 class Status(Enum):
@@ -144,11 +144,10 @@ class Plan(Sequence[Step], metaclass=RightNames):
             No step, or more than one step, has this path or these words.
         """
         if isinstance(index, str | tuple):
-            from confab.planner.finding import StepPosition, find
+            from confab.planner.finding import find
 
-            steps = {step.path: step for step in self.walk()}
-            places = [StepPosition(path, step.level, step.id, (str(step),)) for path, step in steps.items()]
-            return steps[find(places, index, "walk() yields all steps")]
+            path = find(self._positions(), index, "walk() yields all steps")
+            return next(step for step in self.walk() if step.path == path)
         if isinstance(index, int) and not -len(self.steps) <= index < len(self.steps):
             raise IndexError(f"no step {index}: the first level has {len(self.steps)}, counted from 0")
         return self.steps[index]
@@ -214,13 +213,13 @@ class Plan(Sequence[Step], metaclass=RightNames):
         """
         from confab.planner.forms import digraph
 
-        return digraph(self._nodes())
+        return digraph(self._positions())
 
     def to_dot(self) -> str:
         """Return the plan as Graphviz text: sub-steps are drawn below a step, and dashed arrows lead to the next step."""
         from confab.planner.forms import dot
 
-        return dot(self._nodes())
+        return dot(self._positions())
 
     def to_records(self) -> list[dict[str, object]]:
         """Return a record for each step, with its path, level, ID, behaviour, arguments and bindings.
@@ -246,15 +245,15 @@ class Plan(Sequence[Step], metaclass=RightNames):
 
         return pandas.DataFrame(self.to_records())
 
-    def _nodes(self) -> list[StepEntry]:
-        from confab.planner.forms import StepEntry
+    def _positions(self) -> list[StepPosition]:
+        from confab.planner.finding import StepPosition
 
-        return [StepEntry(step.path, str(step), step.level, step.id) for step in self.walk()]
+        return [StepPosition(step.path, step.level, step.id, (str(step),)) for step in self.walk()]
 
     def _repr_html_(self) -> str:
         from confab.planner.forms import html
 
-        return html(repr(self).splitlines()[0], self._nodes())
+        return html(repr(self).splitlines()[0], self._positions())
 
 
 @dataclass
@@ -333,17 +332,10 @@ class SoftGoal(NamedTuple):
 
 @dataclass(frozen=True)
 class Forgone:
-    """A soft goal that a plan leaves unmet.
+    """A soft goal that a plan leaves unmet, with the cost `weight` of leaving it unmet.
 
-    Parameters
-    ----------
-    fact : Fact
-    weight : Fraction
-        The cost of leaving the goal unmet.
-    price : Fraction, optional
-        The additional cost of a plan that also meets the goal, or None if no such plan was found.
-    conditions : tuple of Condition
-        The conditions of a goal with alternatives or quantifiers.
+    `price` is the additional cost of a plan that also meets the goal, or None if no such plan was found. `conditions` are the
+    conditions of a goal with alternatives or quantifiers.
     """
 
     fact: Fact

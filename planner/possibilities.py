@@ -156,10 +156,14 @@ class Lowest:
 
     def allowed(self, symbol: Symbol) -> Range:
         """Return the range that the situation type of a symbol allows, extended to contain the initial amount."""
-        quantity, first = self.quantity(symbol.situation), number(self.initial(symbol))
-        low = ANYTHING.low if quantity is None or quantity.least is None else quantity.least
-        high = ANYTHING.high if quantity is None or quantity.most is None else quantity.most
-        return Range(min(low, first), max(high, first))
+        limits, first = self.bounds_of(symbol.situation), number(self.initial(symbol))
+        return Range(min(limits.low, first), max(limits.high, first))
+
+    def bounds_of(self, situation: str) -> Range:
+        """Return the bounds of the amounts of a situation type."""
+        quantity = self.quantity(situation)
+        least, most = (None, None) if quantity is None else (quantity.least, quantity.most)
+        return Range(-math.inf if least is None else least, math.inf if most is None else most)
 
     def rows(self, relation: str, position: int) -> Mapping[str, list[tuple[str, ...]]]:
         """Return the tuples of a relation, indexed by the individual at a position."""
@@ -532,11 +536,10 @@ class FactEvaluation:
             quantity = self.lowest.quantity(symbol.situation)
             if quantity is None:
                 return None
-            least = -math.inf if quantity.least is None else quantity.least
-            most = math.inf if quantity.most is None else quantity.most
+            limits = self.lowest.bounds_of(symbol.situation)
             if not surely and (kept := self.before(symbol)) is not None:
-                least, most = min(least, kept.low), max(most, kept.high)
-            low, high = max(new.low, least), min(new.high, most)
+                limits = limits.hull(kept)
+            low, high = max(new.low, limits.low), min(new.high, limits.high)
             if low > high or (surely and low == high and not quantity.allows(low)):
                 return None
             after[symbol] = Range(low, high), surely

@@ -77,10 +77,6 @@ class Request:
 def solve(request: Request) -> Outcome:
     """Return the outcome of a planning call after a check of the plan or the certificate.
 
-    Parameters
-    ----------
-    request : Request
-
     Raises
     ------
     ValueError

@@ -66,14 +66,7 @@ def arguments_of(key: Key) -> tuple[str, ...]:
 
 
 class Table:
-    """A state that is changed in place, with a log of overwritten values.
-
-    Parameters
-    ----------
-    situations : iterable of str
-        Names of all situation types.
-    state : State
-    """
+    """A state that is changed in place, with a log of overwritten values."""
 
     def __init__(self, situations: Iterable[str], state: State) -> None:
         self.now: dict[str, dict[Key, str]] = {name: {} for name in situations}
@@ -141,10 +134,7 @@ class Table:
 class PythonWriter:
     """Writer of Python code that evaluates the conditions and behaviours of one problem on the dictionaries of a table.
 
-    Parameters
-    ----------
-    problem : Problem
-        The problem; its initial state and goal aren't used.
+    The initial state and the goal of the problem aren't used.
     """
 
     def __init__(self, problem: Problem) -> None:

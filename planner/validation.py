@@ -132,6 +132,14 @@ def successor(problem: Problem, behavior: Behavior, arguments: Sequence[str], st
     return {**state, **{Symbol(situation, key): value for situation, key, value in changes}}
 
 
+def followed(problem: Problem, steps: Iterable[Step], state: State) -> State | None:
+    """Return the state after the behaviours of some steps, or None if one of them isn't applicable; sub-steps don't count."""
+    now: State | None = state
+    for step in steps:
+        now = None if now is None else successor(problem, problem.domain.behaviors[step.behavior], step.arguments, now)
+    return now
+
+
 class _PlanExecution:
     """The execution of a plan on symbols, with the current facts and the faults."""
 

@@ -1,4 +1,4 @@
-"""The agenda of an episode: the steps still to be executed, postponed goals, and requests to check the steps."""
+"""The agenda of an episode: the steps still to be executed, and postponed goals."""
 
 from __future__ import annotations
 
@@ -11,17 +11,10 @@ from confab.reasoner.symbols import Problem, State, Symbol
 
 @dataclass
 class RemainingSteps:
-    """The steps still to be executed; the first step may be partly executed.
+    """The steps still to be executed, with the task for which they were planned; the first step may be partly executed.
 
-    Attributes
-    ----------
-    planned_for : Problem
-        The task for which the steps were planned.
-    steps : tuple of Step
-    begun : mapping of path to State
-        The situation before each step in progress.
-    sound : bool
-        Whether each step in progress would be applicable in the situation before it, updated with the facts observed since then.
+    `begun` has the situation before each step in progress. `sound` states whether each step in progress would be applicable in that
+    situation, updated with the facts observed since then.
     """
 
     planned_for: Problem
@@ -40,31 +33,10 @@ class RemainingSteps:
 
 
 @dataclass
-class ReplanRequest:
-    """A request to check the agenda.
-
-    The request contains the reason, and the expected values that were not observed. The reason is empty if there is no request.
-    """
-
-    why: str = ""
-    missed: dict[Symbol, str | None] = field(default_factory=dict)
-
-    def add(self, why: str) -> None:
-        """Add a reason to the request."""
-        if why not in self.why:
-            self.why = f"{self.why}; {why}" if self.why else why
-
-
-@dataclass
 class Postponed:
     """Postponed goals, each with its value and the reason for postponing it.
 
-    Attributes
-    ----------
-    aside : mapping of Symbol to (value, Reason)
-        Goals that are impossible in the present situation.
-    put_off : mapping of Symbol to (value, Reason)
-        Goals that are unreachable without the facts in doubt.
+    The goals `aside` are impossible in the present situation. The goals `put_off` are unreachable without the facts in doubt.
     """
 
     aside: dict[Symbol, tuple[str, Reason]] = field(default_factory=dict)

@@ -12,7 +12,7 @@ from confab.planner.acting.failure_memory import Static, without_relations
 from confab.planner.acting.symbolic_world import met, with_individual
 from confab.planner.hierarchical.planner import Compiled, compiled
 from confab.planner.plan import Step
-from confab.planner.validation import successor
+from confab.planner.validation import followed
 from confab.reasoner.aggregates.totals import following
 from confab.reasoner.amounts import DECIMAL
 from confab.reasoner.possible import PLACE
@@ -139,12 +139,7 @@ class Belief:
 
     def could_begin(self, step: Step, state: State) -> bool:
         """Return whether a step is applicable in a state; steps that are refined together are applied one after another."""
-        for one in step.together:
-            after = successor(self.problem, self.problem.domain.behaviors[one.behavior], one.arguments, state)
-            if after is None:
-                return False
-            state = after
-        return True
+        return followed(self.problem, step.together, state) is not None
 
     # ------------------------------------------------------------------------------------------------- knowledge of the scene
 

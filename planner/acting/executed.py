@@ -12,8 +12,8 @@ from dataclasses import replace
 from confab.planner.acting.episode import Episode, InterventionKind, situation
 from confab.planner.acting.symbolic_world import met, with_individual
 from confab.planner.plan import Plan, Step
-from confab.planner.validation import carried_out, open_goals, successor
-from confab.reasoner.symbols import FALSE, Problem, State, Symbol
+from confab.planner.validation import carried_out, followed, open_goals
+from confab.reasoner.symbols import FALSE, Problem, State
 
 
 def as_planned(problem: Problem, episode: Episode) -> Iterator[tuple[Problem, Plan]]:
@@ -32,7 +32,7 @@ def as_planned(problem: Problem, episode: Episode) -> Iterator[tuple[Problem, Pl
         if episode.done.steps and equal(expected, episode.observed):
             yield with_reached_goals(start, expected, episode.goal), episode.done
             return
-    part, expected, ended = list[Step](), dict(episode.initial), 0.0
+    part, expected, ended = list[Step](), episode.initial, 0.0
     for step in episode.done.steps:
         done = {(low.path, low.behavior, low.arguments) for low in Plan((step,)).primitives}
         events = [e for e in episode.events if (e.step.path, e.step.behavior, e.step.arguments) in done]
@@ -52,14 +52,11 @@ def as_planned(problem: Problem, episode: Episode) -> Iterator[tuple[Problem, Pl
         yield with_reached_goals(start, expected, episode.goal), Plan(tuple(part))
 
 
-def after(problem: Problem, plan: Plan, state: State) -> dict[Symbol, str]:
+def after(problem: Problem, plan: Plan, state: State) -> State:
     """Return the state after a valid plan."""
-    now = dict(state)
-    for step in plan.primitives:
-        following = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, now)
-        assert following is not None, "the plan checker has accepted the plan"
-        now = following
-    return now
+    found = followed(problem, plan.primitives, state)
+    assert found is not None, "the plan checker has accepted the plan"
+    return found
 
 
 def with_newcomers(problem: Problem, episode: Episode) -> Problem:

@@ -19,7 +19,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from time import perf_counter
 
-from confab.planner.acting.agenda import Postponed, RemainingSteps, ReplanRequest
+from confab.planner.acting.agenda import Postponed, RemainingSteps
 from confab.planner.acting.belief import UNSEEN, Belief
 from confab.planner.acting.episode import (
     End,
@@ -36,12 +36,12 @@ from confab.planner.acting.failure_memory import Caution, refuted_by, relied_on_
 from confab.planner.acting.record import Record
 from confab.planner.acting.repair import difference, repair_or_replan, replan, vanished
 from confab.planner.acting.retries import DEFAULT, Retries, RetryPolicy
-from confab.planner.acting.step_trees import all_steps, chains_of, first_chain, tree_of, without, without_first
+from confab.planner.acting.step_trees import chains_of, tree_of, without
 from confab.planner.acting.unreached import blamed, blocked, with_discoveries
 from confab.planner.acting.world import INTERRUPTED, WITHOUT_EFFECT, Guarded, Verdict, World, WorldError, WorldReport
 from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, renumbered
-from confab.planner.validation import open_goals, successor
+from confab.planner.validation import followed, open_goals
 from confab.reasoner.limits import LimitError, check
 from confab.reasoner.refutations import Refutation
 from confab.reasoner.symbols import FALSE, Fact, Problem, State, Symbol
@@ -82,10 +82,6 @@ def act(
         Failures in earlier episodes; unreliable facts and behaviours are avoided if there is an alternative.
     together : bool
         Whether several actors execute primitives at once, until a primitive fails; the world must be `Concurrent`.
-
-    Returns
-    -------
-    Episode
     """
     if caution is not None and plan is None:
         problem = caution.applied(problem, planner or hierarchical_plan, retry_policy.planning)
@@ -105,7 +101,7 @@ def act(
         while run.going:
             check("acting")
             run.intervene()
-            if run.request.why:
+            if run.requested:
                 run.reconsider()
             elif not run.agenda.steps:
                 run.finish()
@@ -140,7 +136,8 @@ class _RunningEpisode:
     together: bool
     going: bool = True
     goals: Postponed = field(default_factory=Postponed)
-    request: ReplanRequest = field(default_factory=ReplanRequest)
+    requested: str = ""  # the reason for checking the agenda, if a check is requested
+    missed: dict[Symbol, str | None] = field(default_factory=dict)  # values that were expected and not observed
 
     def __post_init__(self) -> None:
         self.record, self.agenda = Record(self.belief.state), RemainingSteps(self.belief.problem)
@@ -155,7 +152,7 @@ class _RunningEpisode:
         self.world.announce(tuple(i for i in self.waiting if i.at is not None))
         begun, outcome, limits = plan, None, self.retries.policy.planning
         if begun is None:
-            self.request.why = ""
+            self.requested = ""
             self.set_aside_the_vanished()
             begin = perf_counter()
             steps, outcome = replan(self.belief.problem, self.planner, self.belief.using, limits)
@@ -203,7 +200,7 @@ class _RunningEpisode:
             return
         done, events = self.record.done, self.record.events
         surprises = events[-1].surprises if events and what == "end" else ()
-        whole = Plan(tree_of({**done, **{p.path: p for p in all_steps(self.agenda.steps)}}))
+        whole = Plan(tree_of({**done, **{p.path: p for p in Plan(self.agenda.steps).walk()}}))
         clock = 0.0
         with suppress(WorldError):
             clock = self.world.seconds
@@ -218,20 +215,18 @@ class _RunningEpisode:
 
         Return None if the precondition of the primitive doesn't hold.
         """
-        step, problem = first_chain(self.agenda.steps)[-1], self.belief.task
-        after = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, problem.initial)
-        return after and {symbol: value for symbol, value in after.items() if value != UNSEEN}
+        step, problem = next(chains_of(self.agenda.steps))[-1], self.belief.task
+        after = followed(problem, [step], problem.initial)
+        return None if after is None else {symbol: value for symbol, value in after.items() if value != UNSEEN}
 
     def perform(self, expected: dict[Symbol, str]) -> tuple[tuple[Step, ...], State, Verdict]:
         """Execute the next primitive and observe; a failed primitive counts as done if its effects are observed.
 
         Return the primitive with its ancestors, the situation before it, and the verdict.
         """
-        chain, record = first_chain(self.agenda.steps), self.record
+        chain, record = next(chains_of(self.agenda.steps)), self.record
         step, before = chain[-1], self.belief.problem.initial
-        for above in chain[:-1]:
-            self.agenda.begun.setdefault(above.path, before)
-        changes = [Fact(s, v) for s, v in sorted(expected.items()) if before.get(s) != v]
+        changes = self.begin(chain, before, expected)
         self.say("begin", step, changes)
         begin = self.world.seconds
         verdict = self.world.execute(step)
@@ -240,8 +235,7 @@ class _RunningEpisode:
         if verdict.ok and self.without_effect(changes, seen):
             text = f"{step} was reported as done, but {changes[0]} is not seen"
             verdict = WorldReport(False, WITHOUT_EFFECT, step.arguments, text)
-        there = bool(changes) and all(seen.get(fact.symbol) == fact.value for fact in changes)
-        done = verdict.ok or (there and verdict.code != INTERRUPTED)
+        done = is_done(verdict, changes, seen)
         surprises = self.look(expected if done else dict(before), seen)
         relied_on = tuple(relied_on_by(self.belief.problem, chain))
         record.events.append(
@@ -249,13 +243,19 @@ class _RunningEpisode:
         )
         if done:
             record.done.update((above.path, above) for above in chain)
-            self.agenda.steps = without_first(self.agenda.steps)
+            self.agenda.steps = without(self.agenda.steps, {step.path})
         if surprises:
-            self.request_replan("; ".join(map(_told, surprises[:3])), surprises)
+            self.request_replan("", surprises)
         self.say("end", step, changes)
         if len(record.events) >= self.retries.most:
             self.give_up(Reason(f"stopped at the limit of {self.retries.most} primitives"))
         return chain, before, verdict
+
+    def begin(self, chain: tuple[Step, ...], before: State, after: State) -> list[Fact]:
+        """Record that the ancestors of a primitive have begun; return the facts that the primitive changes."""
+        for above in chain[:-1]:
+            self.agenda.begun.setdefault(above.path, before)
+        return [Fact(s, v) for s, v in sorted(after.items()) if before.get(s) != v]
 
     def perform_together(self) -> None:
         """Execute the remaining primitives with all actors at once, until all have ended or something unexpected happens.
@@ -272,14 +272,11 @@ class _RunningEpisode:
         failed = list[tuple[tuple[Step, ...], State, Verdict]]()
         for slot, verdict in ended:
             step, chain = slot.step, chains[slot.step.path]
-            for above in chain[:-1]:
-                self.agenda.begun.setdefault(above.path, state)
-            after = successor(problem, problem.domain.behaviors[step.behavior], step.arguments, state) or state
-            changes = [Fact(s, v) for s, v in sorted(after.items()) if state.get(s) != v]
-            there = bool(changes) and all(seen.get(fact.symbol) == fact.value for fact in changes)
+            after = followed(problem, [step], state) or state
+            changes = self.begin(chain, state, after)
             relied_on = tuple(relied_on_by(problem, chain))
             record.events.append(ExecutedPrimitive(step, slot.begin, slot.end, verdict.ok, verdict.code, (), relied_on))
-            if verdict.ok or (there and verdict.code != INTERRUPTED):
+            if is_done(verdict, changes, seen):
                 record.done.update((above.path, above) for above in chain)
                 finished.add(step.path)
                 record.changes(state, after, slot.end)
@@ -292,7 +289,7 @@ class _RunningEpisode:
         self.belief.problem = replace(problem, initial=state)
         surprises = self.look(dict(state), seen)
         if surprises or self.agenda.steps:
-            self.request_replan("; ".join(map(_told, surprises[:3])) or "the actors were interrupted", surprises)
+            self.request_replan("" if surprises else "the actors were interrupted", surprises)
         if len(record.events) >= self.retries.most:
             self.give_up(Reason(f"stopped at the limit of {self.retries.most} primitives"))
         for chain, before, verdict in failed:
@@ -341,15 +338,15 @@ class _RunningEpisode:
             self.note(intervention, now)
         if any(i.of_world for i in due):
             surprises = self.look(self.belief.state)
-            self.request_replan("; ".join(map(_told, surprises[:3])), surprises)
+            self.request_replan("", surprises)
 
     def due(self, finished: Container[tuple[int, ...]] = ()) -> list[Intervention]:
         """Return the interventions that are due when, beside the recorded primitives, those at some paths have finished."""
         if not self.waiting:
             return []
         steps = self.agenda.steps if self.together else self.agenda.steps[:1]
-        left = {step.path for step in all_steps(without(steps, finished))}
-        gone = {step.path: step for step in (*self.record.done.values(), *all_steps(steps))}
+        left = {step.path for step in Plan(without(steps, finished)).walk()}
+        gone = {step.path: step for step in (*self.record.done.values(), *Plan(steps).walk())}
         gone = {path: step for path, step in gone.items() if path not in left}
         first = self.belief.problem.domain.levels[0]
         ids = {one.id for step in gone.values() if step.level == first for one in step.together}
@@ -381,12 +378,14 @@ class _RunningEpisode:
         self.say("intervention", text=intervention.text)
 
     def request_replan(self, why: str, surprises: Sequence[Surprise] = ()) -> None:
-        """Request that the agenda is checked again."""
-        self.request.add(why)
+        """Request that the agenda is checked again, for a reason or because of surprises."""
+        why = why or "; ".join(map(_told, surprises[:3]))
+        if why not in self.requested:
+            self.requested = f"{self.requested}; {why}" if self.requested else why
         for surprise in surprises:
-            self.request.missed.setdefault(surprise.symbol, surprise.expected)
+            self.missed.setdefault(surprise.symbol, surprise.expected)
         changes = {s.symbol: s.observed for s in surprises}
-        for step in first_chain(self.agenda.steps)[:-1]:
+        for step in next(chains_of(self.agenda.steps), ())[:-1]:
             if step.path in self.agenda.begun:
                 as_if = {s: v for s, v in {**self.agenda.begun[step.path], **changes}.items() if v is not None}
                 self.agenda.sound = self.agenda.sound and self.belief.could_begin(step, as_if)
@@ -395,8 +394,8 @@ class _RunningEpisode:
 
     def reconsider(self) -> None:
         """Repair the plan, or replan; drop unreachable goals."""
-        why, self.request.why, belief, record = self.request.why, "", self.belief, self.record
-        if self.request.missed:
+        why, self.requested, belief, record = self.requested, "", self.belief, self.record
+        if self.missed:
             self.want_again(self.goals.aside)
         self.set_aside_the_vanished()
         counted = len(record.events), len(record.interventions), len(record.failures), len(record.discovered)
@@ -411,7 +410,7 @@ class _RunningEpisode:
         limits, old = self.retries.policy.planning, self.agenda.steps
         end = limits.end()
         if self.repairs:
-            expected = {s: v for s, v in {**belief.state, **self.request.missed}.items() if v is not None}
+            expected = {s: v for s, v in {**belief.state, **self.missed}.items() if v is not None}
             planned = replace(self.agenda.planned_for, initial=expected)
             begun = bool(old) and old[0].path in self.agenda.begun
             repaired = repair_or_replan(
@@ -423,7 +422,7 @@ class _RunningEpisode:
             kind, cost = "replan", float(len(Plan(steps or ()).primitives))
         seconds = perf_counter() - begin
         record.seconds["repairing"] += seconds
-        self.agenda.planned_for, self.agenda.sound, self.request.missed = belief.task, True, {}
+        self.agenda.planned_for, self.agenda.sound, self.missed = belief.task, True, {}
         if steps is None:
             self.on_no_plan(outcome, limits.until(end))
             return
@@ -508,7 +507,7 @@ class _RunningEpisode:
         self.belief.want({})
         self.goals.clear()
         self.retries.most = len(self.record.events) + self.retries.policy.primitives
-        self.request.why = reason.text
+        self.requested = reason.text
 
     # ---------------------------------------------------------------------------------------------------- failures
 
@@ -559,6 +558,12 @@ class _RunningEpisode:
         self.agenda.sound = False
         self.request_replan(f"failed primitives are retried: {why}")
         return True
+
+
+def is_done(verdict: Verdict, changes: Sequence[Fact], seen: State) -> bool:
+    """Return whether a primitive has succeeded: it was reported as done, or all its effects are observed."""
+    there = bool(changes) and all(seen.get(fact.symbol) == fact.value for fact in changes)
+    return verdict.ok or (there and verdict.code != INTERRUPTED)
 
 
 def _told(surprise: Surprise) -> str:

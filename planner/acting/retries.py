@@ -32,19 +32,9 @@ DEFAULT = RetryPolicy()
 class Retries:
     """The attempts of an episode so far.
 
-    Attributes
-    ----------
-    policy : RetryPolicy
-    attempts : mapping of behaviour and arguments to int
-        The number of failures of each primitive since all facts were last trusted.
-    rounds : int
-        The number of rounds of attempts, including the first.
-    pondered : mapping of situation to int
-        The number of checks of the agenda in each situation.
-    room_wanted : bool
-        Whether the world was asked for free spots.
-    most : int
-        Maximum number of primitives of the episode.
+    `attempts` counts the failures of each primitive since all facts were last trusted. `rounds` counts the rounds of attempts,
+    including the first. `pondered` counts the checks of the agenda in each situation. `room_wanted` states whether the world was
+    asked for free spots. `most` is the maximum number of primitives of the episode.
     """
 
     policy: RetryPolicy

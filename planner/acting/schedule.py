@@ -14,7 +14,7 @@ from typing import TypeAlias
 import networkx
 
 from confab.planner.plan import Step
-from confab.planner.validation import successor
+from confab.planner.validation import followed
 from confab.reasoner.symbols import Problem, State, Symbol
 
 PartialOrder: TypeAlias = "networkx.DiGraph[int]"
@@ -34,15 +34,9 @@ class WorkerSlot:
 
 
 def partial_order(problem: Problem, primitives: Sequence[Step]) -> PartialOrder:
-    """Return the necessary order of primitives as a transitively reduced graph.
+    """Return the necessary order of primitives, which begin in the initial state, as a transitively reduced graph.
 
     The nodes are the primitives' positions in the sequence.
-
-    Parameters
-    ----------
-    problem : Problem
-        The problem whose initial state is the state before the primitives.
-    primitives : sequence of Step
 
     Raises
     ------
@@ -52,7 +46,7 @@ def partial_order(problem: Problem, primitives: Sequence[Step]) -> PartialOrder:
     states: list[State] = [problem.initial]
     writes: list[dict[Symbol, tuple[str | None, str]]] = []
     for step in primitives:
-        after = _done(problem, step, states[-1])
+        after = followed(problem, [step], states[-1])
         if after is None:
             raise ValueError(f"{step} isn't applicable in the state before it")
         before = states[-1]
@@ -76,45 +70,6 @@ def workers_of(problem: Problem) -> frozenset[str]:
     """
     kinds = {s.arguments[0] for s in problem.domain.situations.values() if s.rest is not None and s.arguments}
     return frozenset(individual for kind in kinds for individual in problem.classes.get(kind, ()))
-
-
-def schedule(
-    problem: Problem,
-    primitives: Sequence[Step],
-    seconds_of: Mapping[int, float] | None = None,
-    apart: Compatible = lambda one, other: True,
-) -> list[WorkerSlot]:
-    """Return a schedule of primitives in which every worker begins each primitive as early as possible.
-
-    Parameters
-    ----------
-    problem : Problem
-    primitives : sequence of Step
-    seconds_of : mapping of position to seconds, optional
-        Duration of each primitive; one second by default.
-    apart : callable
-        Function of two primitives that returns whether there is room for both at the same time.
-
-    Returns
-    -------
-    list of WorkerSlot
-        The slots in the order of their begins.
-    """
-    seconds = {i: 1.0 if seconds_of is None else seconds_of[i] for i in range(len(primitives))}
-    order = partial_order(problem, primitives)
-    urgency = _urgency(order, seconds)
-    workers = workers_of(problem)
-    slots: dict[int, WorkerSlot] = {}
-    running: list[WorkerSlot] = []
-    now = 0.0
-    while len(slots) < len(primitives):
-        for i in ready(order, primitives, workers, slots.keys(), [s.position for s in running], urgency, apart):
-            slot = WorkerSlot(primitives[i], i, worker_of(primitives[i], workers), now, now + seconds[i])
-            slots[i] = slot
-            running.append(slot)
-        now = min(slot.end for slot in running)
-        running = [slot for slot in running if slot.end > now]
-    return sorted(slots.values(), key=lambda slot: (slot.begin, slot.position))
 
 
 def ready(
@@ -144,30 +99,16 @@ def ready(
 
 def urgency_of(order: PartialOrder) -> dict[int, float]:
     """Return for each primitive the number of primitives in the longest chain that begins with this primitive."""
-    return _urgency(order, dict.fromkeys(order, 1.0))
+    found: dict[int, float] = {}
+    for i in reversed(list(networkx.topological_sort(order))):
+        found[i] = 1.0 + max((found[j] for j in order.successors(i)), default=0.0)
+    return found
 
 
 def worker_of(step: Step, workers: Iterable[str]) -> str:
     """Return the worker of a step: the first argument that is a worker; an empty string if no argument is a worker."""
     known = workers if isinstance(workers, frozenset) else frozenset(workers)
     return next((argument for argument in step.arguments if argument in known), "")
-
-
-def makespan(slots: Sequence[WorkerSlot]) -> float:
-    """Return the time at which the last primitive ends."""
-    return max((slot.end for slot in slots), default=0.0)
-
-
-def _urgency(order: PartialOrder, seconds: Mapping[int, float]) -> dict[int, float]:
-    """Return for each primitive the total duration of the longest chain that begins with this primitive."""
-    found: dict[int, float] = {}
-    for i in reversed(list(networkx.topological_sort(order))):
-        found[i] = seconds[i] + max((found[j] for j in order.successors(i)), default=0.0)
-    return found
-
-
-def _done(problem: Problem, step: Step, state: State) -> dict[Symbol, str] | None:
-    return successor(problem, problem.domain.behaviors[step.behavior], step.arguments, state)
 
 
 def _needs(
@@ -191,5 +132,5 @@ def _needs(
 
 def _same(problem: Problem, step: Step, state: State, writes: Mapping[Symbol, tuple[str | None, str]]) -> bool:
     """Return whether a primitive is applicable in a state and has the same effects as in the plan."""
-    after = _done(problem, step, state)
+    after = followed(problem, [step], state)
     return after is not None and all(after.get(s) == new for s, (_, new) in writes.items())

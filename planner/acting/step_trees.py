@@ -1,4 +1,4 @@
-"""Trees of partly executed steps: the next primitive, the remaining steps, and the executed steps."""
+"""Trees of partly executed steps: the next primitives, the remaining steps, and the executed steps."""
 
 from __future__ import annotations
 
@@ -6,22 +6,6 @@ from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from confab.planner.plan import Step
-
-
-def first_chain(steps: Sequence[Step]) -> tuple[Step, ...]:
-    """Return the first primitive below the first step, preceded by all its ancestors."""
-    chain = list(steps[:1])
-    while chain and chain[-1].steps:
-        chain.append(chain[-1].steps[0])
-    return tuple(chain)
-
-
-def without_first(steps: Sequence[Step]) -> tuple[Step, ...]:
-    """Return the steps without the first primitive, and without parents that have no other primitive."""
-    if not steps[0].steps:
-        return tuple(steps[1:])
-    below = without_first(steps[0].steps)
-    return (replace(steps[0], steps=below), *steps[1:]) if below else tuple(steps[1:])
 
 
 def chains_of(steps: Sequence[Step]) -> Iterator[tuple[Step, ...]]:
@@ -38,14 +22,9 @@ def without(steps: Sequence[Step], paths: Container[tuple[int, ...]]) -> tuple[S
     )
 
 
-def all_steps(steps: Sequence[Step]) -> Iterator[Step]:
-    """Yield the steps and all their descendants."""
-    return (step for root in steps for step in root.walk())
-
-
-def tree_of(steps: Mapping[tuple[int, ...], Step], above: tuple[int, ...] = ()) -> tuple[Step, ...]:
+def tree_of(steps: Mapping[tuple[int, ...], Step]) -> tuple[Step, ...]:
     """Return the trees of steps that are given as a mapping from paths to steps."""
     below: dict[tuple[int, ...], list[Step]] = {}
     for path in sorted(steps, key=lambda p: (-len(p), p)):
         below.setdefault(path[:-1], []).append(replace(steps[path], steps=tuple(below.get(path, ()))))
-    return tuple(below.get(above, ()))
+    return tuple(below.get((), ()))

@@ -20,15 +20,9 @@ FaultInjection = Callable[[Step, State], WorldReport | None]
 
 
 class SymbolicWorld:
-    """A world in which every primitive takes its duration and then has its effects.
+    """A world in which every primitive takes its duration, one second by default, and then has its effects.
 
-    Parameters
-    ----------
-    problem : Problem
-        The problem whose initial state is the initial state of the world.
-    seconds_of : mapping of behaviour to seconds
-        Duration of each behaviour; one second by default.
-    fault : callable, optional
+    The world begins in the initial state of the problem.
     """
 
     measured = False

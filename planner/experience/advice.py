@@ -32,14 +32,7 @@ from confab.reasoner.symbols import Problem
 
 @dataclass
 class Advisor:
-    """Experience in the form that the planner uses.
-
-    Parameters
-    ----------
-    experience : Experience
-    trusted : bool
-        Whether the rules of the experience may be used.
-    """
+    """Experience in the form that the planner uses; its rules are used only if it is trusted."""
 
     experience: Experience
     trusted: bool = True
@@ -161,21 +154,10 @@ def plan(
     improve: int = fast.ORDERS,
     leave_levels: bool = True,
 ) -> Outcome:
-    """Plan with experience.
+    """Plan with experience, which has influence according to `mode`: ``strict``, ``guarded`` or ``leading``.
 
-    Parameters
-    ----------
-    problem : Problem
-    memory : Memory, optional
-    mode : str
-        ``strict``, ``guarded`` or ``leading``: the influence of experience.
-    limits, using, improve, leave_levels
-        The parameters of `confab.planner.hierarchical.planner.plan` with the same names.
-
-    Returns
-    -------
-    Outcome
-        `search` counts the steps tried by rules as expansions.
+    The other parameters are those of `confab.planner.hierarchical.planner.plan`. The counts of the outcome include the steps that
+    rules have tried.
     """
     if memory is None or not memory.leads(problem, mode):
         return fast.plan(problem, limits=limits, improve=improve, using=using, leave_levels=leave_levels)

@@ -43,17 +43,8 @@ Steps: TypeAlias = "list[RefinedStep]"
 class RulePolicy:
     """A policy that follows learned rules to achieve the goals of one planning call.
 
-    Parameters
-    ----------
-    call : Call
-    rules : iterable of Rule
-    orders : sequence of LearnedOrder
-    score : function of an instance, optional
-        Of equally cheap instances, the one with the greatest score is tried first.
-    joins : dict, optional
-        Compiled rules that several planning calls share; newly compiled rules are added.
-    ranked : function of a method and individuals for its roles, optional
-        Function that returns the individuals in order of preference.
+    Of equally cheap instances, the one with the greatest `score` is tried first. `joins` contains compiled rules that several
+    planning calls share. `ranked` sorts the individuals for the roles of a method by preference.
     """
 
     def __init__(
@@ -190,14 +181,7 @@ class RulePolicy:
     def achieve(self, level: int, goal: Goal, above: tuple[Goal, ...] = (), below: float = inf) -> Steps | None:
         """Apply steps that achieve a goal; return None and leave the table unchanged if no rule instance achieves the goal.
 
-        Parameters
-        ----------
-        level : int
-        goal : Goal
-        above : tuple of Goal
-            The goals to which `goal` is a subgoal.
-        below : float
-            Only instances with a cost below this bound are tried.
+        The goal is a subgoal of the goals `above`. Only instances with a cost less than `below` are tried.
         """
         if self.instances.met(goal):
             return []

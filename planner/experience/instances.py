@@ -59,26 +59,10 @@ Score: TypeAlias = "Callable[[RuleInstance], float]"
 
 
 class Instances:
-    """The instances of rules in the current state of a call, and the costs of goals.
+    """The instances of rules in the current state of a call, and the costs of goals; both are cached until the state changes.
 
-    Results are cached until the state changes.
-
-    Parameters
-    ----------
-    call : Call
-    rules : iterable of Rule
-    allowance : Allowance
-        The allowance, which counts the effort of matching rules.
-    score : function of an instance, optional
-        Of equally cheap instances, the one with the greatest score is tried first.
-    joins : dict, optional
-        Compiled rules that several planning calls share; newly compiled rules are added.
-
-    Attributes
-    ----------
-    rules : mapping of level and situation type to rules
-    excluded : frozenset of str
-        Individuals that rule instances for other goals consume; excluded individuals fill no role.
+    `rules` maps a level and a situation type to rules. Individuals in `excluded` fill no role, since rule instances for other goals
+    consume them. `joins` contains compiled rules that several planning calls share.
     """
 
     def __init__(

@@ -49,15 +49,7 @@ CHOSEN, PASSED, FAILED = Tally(chosen=1), Tally(passed_over=1), Tally(failed=1)
 def teach(experience: Experience, problem: Problem, plan: Plan | None = None) -> Plan | None:
     """Learn how to solve a problem, with its goals in several orders and separately; return the plan.
 
-    Return None if no plan is found.
-
-    Parameters
-    ----------
-    experience : Experience
-        The experience that is extended.
-    problem : Problem
-    plan : Plan, optional
-        The plan to learn from; without a given plan, the function plans.
+    Without a given plan to learn from, the function plans; it returns None if it finds no plan.
     """
     using = compiled(problem)
     plan = plan or fast.plan(problem, limits=SHORT, using=using).plan

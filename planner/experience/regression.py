@@ -59,13 +59,7 @@ class ExecutedStep:
 
 
 class PlanTrace:
-    """The steps of a plan, executed one after another on the facts of the plan checker.
-
-    Parameters
-    ----------
-    problem : Problem
-    steps : sequence of behaviour and arguments
-    """
+    """The steps of a plan, executed one after another on the facts of the plan checker."""
 
     def __init__(self, problem: Problem, steps: Sequence[Ground]) -> None:
         self.problem, self.rules, self.facts = problem, BehaviorReader(problem), LoggedState(problem, problem.initial)

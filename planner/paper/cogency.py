@@ -48,15 +48,10 @@ def situation(state: State, problem: Problem, level: int) -> list[tuple[Symbol, 
 def cogencies(
     links: Links, conclusions: Sequence[Conclusion], state: State, problem: Problem, level: int
 ) -> dict[Conclusion, float]:
-    """Return ln cogency(b) of each conclusion: the sum of ln p(fact | b) over the facts of a state.
+    """Return ln cogency(b), in [-inf, 0], of each conclusion: the sum of ln p(fact | b) over the facts of a state.
 
     Eq. (1) treats the facts as independent given the behaviour. The factor k of eq. (1) is omitted, because k is the same for
     all behaviours.
-
-    Returns
-    -------
-    mapping of conclusion to float
-        The values are in [-inf, 0]; a larger value is more cogent. Dimensionless.
     """
     facts = situation(state, problem, level)
     uniform = -sum(math.log(len(values)) for _, _, values in facts)

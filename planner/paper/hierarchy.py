@@ -95,10 +95,6 @@ def plan(
         Whether the planner searches the level below for the goal if a level has no plan with refinements.
     proof : Proof
         Function that tries to prove unsolvability, after `DOUBT` expansions and again later with a larger number of states.
-
-    Returns
-    -------
-    Outcome
     """
     begin = perf_counter()
     levels = problem.domain.levels

@@ -17,17 +17,9 @@ from confab.reasoner.symbols import GroundBehavior, Problem, State
 
 
 def learn(problem: Problem, plan: Plan, links: Links, constants: PaperConstants = PAPER) -> Links:
-    """Return the links after one successful execution of a plan, without changing the given links.
+    """Return the links after one successful execution of a plan from the initial state, without changing the given links.
 
-    Parameters
-    ----------
-    problem : Problem
-        The problem whose initial state is the state before the plan.
-    plan : Plan
-        A plan of any depth; a plan without refinements teaches only the level of its steps.
-    links : Links
-    constants : PaperConstants
-        λ of eq. (2).
+    A plan without refinements teaches only the level of its steps.
 
     Raises
     ------
@@ -62,20 +54,8 @@ def reinforce(
 ) -> None:
     """Apply eq. (2): raise the probability of each present fact by λ, then normalise the distribution of each symbol.
 
-    Parameters
-    ----------
-    links : Links
-        The links to change in place.
-    conclusion : Conclusion
-        The behaviour that was planned and executed successfully.
-    state : State
-        The situation in which the behaviour was chosen; the paper doesn't specify the state.
-    problem : Problem
-        The problem, which defines the values that each symbol can have.
-    level : int
-        The behaviour's level; the situation excludes symbols and values of lower levels.
-    learning : float
-        λ of eq. (2).
+    The links are changed in place. `state` is the situation in which the behaviour was chosen, which the paper doesn't specify. The
+    situation excludes symbols and values below the behaviour's level. `learning` is λ.
     """
     check("learning")
     symbols = links.tables.setdefault(conclusion, {})

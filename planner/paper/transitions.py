@@ -26,11 +26,7 @@ class Applied:
 class Model:
     """The behaviours of one problem as functions of states that are tuples.
 
-    Parameters
-    ----------
-    problem : Problem
-        The problem determines the symbols: the symbols of the initial state, all boolean symbols, and the defined symbols of
-        the goal.
+    The symbols are those of the initial state, all boolean symbols, and the defined symbols of the goal.
     """
 
     def __init__(self, problem: Problem) -> None:

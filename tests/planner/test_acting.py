@@ -12,7 +12,7 @@ from confab.planner.acting.episode import End, Episode, Event, Intervention, Int
 from confab.planner.acting.executive import act
 from confab.planner.acting.failure_memory import Caution
 from confab.planner.acting.retries import RetryPolicy
-from confab.planner.acting.schedule import WorkerSlot, schedule
+from confab.planner.acting.schedule import WorkerSlot
 from confab.planner.acting.symbolic_world import SymbolicWorld
 from confab.planner.acting.world import Verdict, WorldReport
 from confab.planner.hierarchical.planner import plan
@@ -25,6 +25,7 @@ from confab.reasoner.graph.knowledge import load
 from confab.reasoner.memory.links import Links
 from confab.reasoner.reading.problem import read
 from confab.reasoner.symbols import FALSE, Fact, Problem, State, Symbol
+from tests.planner.slots import schedule
 
 SERVED_AS_IN_FIGURE_8 = {
     22: {2: [6, 28, 32], 22: [18, 30, 32]},
