@@ -9,8 +9,6 @@ from statistics import median
 from time import perf_counter
 
 from confab.planner.hierarchical.planner import plan as hierarchical_plan
-from confab.planner.paper.cogency import PAPER
-from confab.planner.paper.hierarchy import flat
 from confab.planner.paper.hierarchy import plan as paper_plan
 from confab.planner.plan import Limits, Outcome
 from confab.reasoner.graph.knowledge import load
@@ -30,7 +28,7 @@ def main() -> None:
     begin = perf_counter()
     _row(
         f"flat A* on level {lowest}, same f",
-        flat(problem, lowest, constants=PAPER, limits=Limits(expansions=FLAT_LIMIT)),
+        paper_plan(problem, limits=Limits(expansions=FLAT_LIMIT), levels=[lowest]),
     )
     print(f"\nThe flat search took {perf_counter() - begin:.0f} s to its limit of {FLAT_LIMIT} expansions.\n")
 

@@ -52,10 +52,7 @@ class Marked:
 
 @dataclass(frozen=True)
 class Mark:
-    """A node that marks the step at a path as done if the node's child succeeds, otherwise as not done.
-
-    The node itself always succeeds.
-    """
+    """A node that marks the step at a path as done, or not done, after its child succeeds or fails; the node itself succeeds."""
 
     path: Path
     child: TreeNode
@@ -197,10 +194,7 @@ class _TreeBuilder:
         return self.problem.domain.situations[symbol.situation].quantity is not None
 
     def wanted(self, change: FactChange, kind: NeedKind) -> Fact:
-        """Return the fact that a change makes true.
-
-        For an amount, the fact is a bound: the amount is at least, or at most, the planned value.
-        """
+        """Return the fact that a change makes true; the fact of an amount is that it is at least, or at most, the planned value."""
         symbol, value = change.fact.symbol, change.fact.value
         if kind is NeedKind.GOAL and symbol in self.problem.goal:
             return Fact(symbol, self.problem.goal[symbol])

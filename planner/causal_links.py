@@ -64,10 +64,7 @@ class Need:
 
 @dataclass(frozen=True)
 class Purpose:
-    """The facts that a step makes true on its level, and the needs for them, nearest first.
-
-    A step that isn't needed is superfluous.
-    """
+    """The facts that a step makes true on its level, and the needs for them, nearest first; without needs, it is superfluous."""
 
     gives: tuple[FactChange, ...]
     needs: tuple[Need, ...]
@@ -98,10 +95,7 @@ def _nearest(path: Path) -> Callable[[Need], tuple[int, Path]]:
 
 
 def on_level(steps: Iterable[Step], level: int) -> Iterator[Step]:
-    """Yield the steps of a level in order.
-
-    Where the plan leaves the level, yield the lower-level steps in their place.
-    """
+    """Yield the steps of a level in order, and where the plan leaves the level, the lower-level steps in their place."""
     for step in steps:
         if step.level >= level or not step.steps:
             yield step
@@ -180,10 +174,7 @@ class _LevelExecution:
         yield from found
 
     def changes(self, step: Step) -> dict[Cell, str] | None:
-        """Return the changes of a step in the current state, or None if the step isn't applicable.
-
-        Steps that are refined together make their changes one after another.
-        """
+        """Return the changes of a step in the current state, of joint steps one after another; None if it isn't applicable."""
         found: dict[Cell, str] = {}
         applicable = True
         for _, made in self.in_turn(step):

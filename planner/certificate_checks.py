@@ -44,10 +44,7 @@ The changed entries are None if the behaviour isn't applicable.
 
 
 def refusal(problem: Problem, certificate: Certificate, most: float = WORK) -> str | None:
-    """Return the reason why a certificate doesn't prove that a problem has no plan.
-
-    Return None if the certificate is a proof.
-    """
+    """Return the reason why a certificate doesn't prove that a problem has no plan, or None if it is a proof."""
     try:
         for symbol in (*certificate.told_apart, *certificate.always, *(fact.symbol for fact in certificate.never)):
             if symbol.situation not in problem.domain.situations:
@@ -103,10 +100,7 @@ class Decisions(Generic[T]):
 
 @dataclass
 class CaseView:
-    """The values that symbols can have in one case of a certificate.
-
-    `reads` lists the entries that were read. `unknown` lists the symbols without an entry.
-    """
+    """The values of symbols in one case of a certificate; `reads` are the entries read, `unknown` the symbols without an entry."""
 
     claims: Claims
     case: ClaimCase
@@ -471,10 +465,7 @@ class Cases:
         return (found, allowed) if found.low > allowed.high or found.high < allowed.low else None
 
     def met(self, reading: FactEvaluation, fact: Fact) -> bool:
-        """Return whether a goal or rest value may hold in the final state.
-
-        A symbol that isn't at rest initially may keep its value.
-        """
+        """Return whether a goal or rest value may hold in the end; a symbol that isn't at rest initially may keep its value."""
         symbol, wanted = fact.symbol, fact.value
         if reading.goal(symbol, wanted):
             return True

@@ -53,10 +53,7 @@ SHOWN = 4
 
 @dataclass(frozen=True)
 class Claim:
-    """A fact that never holds or always holds.
-
-    A fact with variables stands for all individuals of the variables' classes.
-    """
+    """A fact that never or always holds; with variables, for all individuals of the variables' classes."""
 
     fact: Fact
     kinds: tuple[tuple[str, str], ...] = ()

@@ -32,18 +32,14 @@ def certified(problem: Problem, outcome: Outcome) -> Outcome:
     from confab.planner.certifying import certify
 
     why = "no certificate was found within the work limit"
-    certificate, tried = outcome.certificate, False
-    while certificate is not None or not tried:
-        if certificate is None:
-            examined = outcome.reason is not None and outcome.reason.states > 0
-            certificate, tried = certify(problem, few_states=examined), True
-        if certificate is not None:
-            refused = refusal(problem, certificate)
-            if refused is None:
-                reason = _added_up(problem, certificate) or told(problem, certificate)
-                return replace(outcome, certificate=certificate, reason=reason)
-            why = f"the checker refuses the certificate: {refused}"
-            certificate = None
+    examined = outcome.reason is not None and outcome.reason.states > 0
+    for find in (lambda: outcome.certificate, lambda: certify(problem, few_states=examined)):
+        if (certificate := find()) is None:
+            continue
+        if (refused := refusal(problem, certificate)) is None:
+            reason = _added_up(problem, certificate) or told(problem, certificate)
+            return replace(outcome, certificate=certificate, reason=reason)
+        why = f"the checker refuses the certificate: {refused}"
     searched = outcome.reason.text if outcome.reason else "the search found no plan"
     reason = Reason(f"{searched}; this isn't certified: {why}", outcome.reason.terms if outcome.reason else ())
     return replace(outcome, status=Status.GAVE_UP, reason=reason, certificate=None)

@@ -407,10 +407,7 @@ def _by_cases(lowest: Lowest, relaxed: Relaxed, goal: State) -> Certificate | No
 
 
 def _by_states(lowest: Lowest) -> Certificate | None:
-    """Return a certificate that distinguishes all values of all symbols.
-
-    Each case is a state, and no state satisfies the goal with all rest values.
-    """
+    """Return a certificate that distinguishes all values: each case is a state, and none satisfies the goal and the rest values."""
     problem = lowest.problem
     told_apart: dict[Symbol, tuple[str, ...]] = {}
     for name in sorted(lowest.changing):
@@ -480,10 +477,7 @@ def _enough(cases: Cases, unmet: Sequence[Fact]) -> tuple[Fact, ...]:
 
 
 def _refined(cases: Cases, end: ClaimCase, relaxed: Relaxed, goal: State) -> Certificate | None:
-    """Return a certificate that also distinguishes the values on which a path through the cases fails.
-
-    Return None if the path succeeds.
-    """
+    """Return a certificate that also distinguishes the values on which a path through the cases fails, or None if it succeeds."""
     lowest, problem = cases.lowest, cases.problem
     path: list[tuple[ClaimCase, Try, ClaimCase]] = []
     while True:

@@ -217,10 +217,7 @@ def all_hold(tests: Sequence[Test], facts: ReadableState, values: Values) -> boo
 
 
 def _breadth(condition: Condition, bound: set[str]) -> int:
-    """Return the rank of a condition with unknown variables.
-
-    The rank is 0 if the state determines the individual, 1 if there are few candidates, otherwise 2.
-    """
+    """Return the number of candidates for an unknown variable: 0 if the state determines the individual, 1 for few, 2 for many."""
     if isinstance(condition, ValueCondition) and not condition.negated:
         return not (variables(condition) - bound == {condition.value} and condition.value not in condition.arguments)
     return 1 if isinstance(condition, RelationCondition) and not condition.negated else 2

@@ -171,10 +171,7 @@ def _beyond(
 
 
 def _bound_to(problem: Problem, behavior: Behavior, symbol: Symbol, individual: str) -> Behavior:
-    """Return a behaviour that changes a symbol only if an individual has one of its roles.
-
-    If no role suits the individual, the behaviour is returned unchanged.
-    """
+    """Return a behaviour that changes a symbol only if an individual has one of its roles; unchanged if no role suits it."""
     parts = [name for name, kind in behavior.kinds.items() if individual in problem.members(kind)]
     parts = [part for part in parts if not any(part in effect.arguments[:1] for effect in behavior.effects
                                                if effect.situation == symbol.situation)]  # fmt: skip

@@ -19,10 +19,7 @@ class CompiledRules:
         self._bind = writer.function(["rules = {}", *_lines(writer)], "rules")
 
     def define(self, table: Table) -> None:
-        """Make a table derive its defined situations.
-
-        Call this function before any compiled function is bound to the table.
-        """
+        """Make a table derive its defined situations, before any compiled function is bound to the table."""
         for group in strata(self.domain.rules):
             stratum = Stratum(table)
             for name in group:

@@ -28,10 +28,7 @@ def digraph(nodes: Sequence[StepPosition]) -> networkx.DiGraph[Path]:
 
 
 def edges(nodes: Sequence[StepPosition]) -> Iterator[tuple[Path, Path, str]]:
-    """Yield the edges of a plan's graph, each with its kind.
-
-    An edge leads from a step to a sub-step (``refines``) or to the next step (``then``).
-    """
+    """Yield the edges of a plan's graph: from a step to a sub-step (``refines``), and to the next step (``then``)."""
     paths = {node.path for node in nodes}
     for *above, place in sorted(paths):
         path = (*above, place)

@@ -62,10 +62,7 @@ class Step:
         return (self, *self.joined)
 
     def walk(self) -> Iterator[Step]:
-        """Yield the step and all steps below it; each step comes before its sub-steps.
-
-        Steps that are refined together are one step of the tree.
-        """
+        """Yield the step and all steps below it, each before its sub-steps; steps that are refined together are one step."""
         waiting = [self]
         while waiting:
             yield (step := waiting.pop())

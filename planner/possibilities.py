@@ -132,10 +132,7 @@ class Lowest:
             raise NoTimeLeftError("more time than is left")
 
     def exists(self, situation: str, arguments: tuple[str, ...]) -> bool:
-        """Return whether a symbol exists.
-
-        A symbol exists if it has an initial value, or if it is boolean and its arguments belong to the right classes.
-        """
+        """Return whether a symbol exists: it has an initial value, or is boolean and its arguments belong to the right classes."""
         if Symbol(situation, arguments) in self.problem.initial:
             return True
         kind = self.problem.domain.situations[situation]
@@ -347,10 +344,7 @@ class FactEvaluation:
         return self._totals[key]
 
     def amount_meets(self, symbol: Symbol, wanted: str, must: bool) -> bool:
-        """Return whether an amount may satisfy a goal; if `must`, whether the amount satisfies the goal in every state.
-
-        The goal is a number or a pair of bounds.
-        """
+        """Return whether an amount may, or if `must` certainly does, satisfy a goal: a number or a pair of bounds."""
         found = self.between(symbol.situation, symbol.arguments)
         try:
             limits = bounds(wanted)
@@ -359,10 +353,7 @@ class FactEvaluation:
         return found is not None and all(compared(found, sign, Range(at, at), must) for sign, at in limits)
 
     def goal(self, symbol: Symbol, wanted: str, must: bool = False) -> bool:
-        """Return whether a goal may hold; if `must`, return whether the goal holds in every state.
-
-        A nonexistent symbol counts as false.
-        """
+        """Return whether a goal may hold, or if `must` holds in every state; a nonexistent symbol counts as false."""
         if not self.lowest.exists(symbol.situation, symbol.arguments):
             return wanted == FALSE
         if self.lowest.quantity(symbol.situation) is not None:
@@ -372,10 +363,7 @@ class FactEvaluation:
     # --------------------------------------------------------------------------------------------------- conditions
 
     def holds(self, condition: Condition, env: Env, kinds: Mapping[str, str], must: bool = False) -> bool:
-        """Return whether a condition may hold; if `must`, return whether the condition holds in every state.
-
-        `env` contains the individuals of the variables.
-        """
+        """Return whether a condition with the individuals `env` may hold, or if `must`, holds in every state."""
         found: bool
         match condition:
             case ValueCondition(situation, arguments, value, negated):

@@ -140,10 +140,7 @@ class _SoftGoalChoices:
         return next((kept for kept in chain((Goals(),), others) if self.total(kept) is not None), None)
 
     def least(self, kept: Goals) -> Fraction | None:
-        """Return a proved lower bound on the cost of a plan for a choice, or None if there is no plan.
-
-        The method stores the cheapest plan for the choice.
-        """
+        """Return a proved lower bound on the cost of a plan for a choice, or None without a plan; store the cheapest plan."""
         if kept not in self.bounds:
             known = proved = self.outcome(kept)
             if self.prove is not None and known.status is not Status.UNSOLVABLE:

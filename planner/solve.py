@@ -39,10 +39,7 @@ DEFAULT_MODE: Mode = "guarded"
 
 
 class RejectedPlanError(Exception):
-    """The plan checker rejects a plan that a search returned; this is an internal error.
-
-    The message names the step and the mode.
-    """
+    """The plan checker rejects a plan that a search returned: an internal error that names the step and the mode."""
 
 
 @dataclass(frozen=True)

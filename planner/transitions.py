@@ -208,10 +208,7 @@ class PythonWriter:
     def conjunction(
         self, conditions: Sequence[Condition], bound: set[str], kinds: Mapping[str, str], where: str
     ) -> list[str]:
-        """Return the conditions as expressions, in an order that binds each variable before its use.
-
-        The method adds newly bound variables to `bound`.
-        """
+        """Return conditions as expressions, in an order that binds each variable before its use; `bound` gets the new variables."""
         check("compiling conditions")
         return [self.expression(ready, bound, kinds, where) for ready in in_binding_order(conditions, bound, where)]
 
@@ -302,10 +299,7 @@ class PythonWriter:
     def adjacent(
         self, relation: str, arguments: Sequence[str], term: str, unbound: AbstractSet[str] = frozenset()
     ) -> tuple[str, float]:
-        """Return an expression for the individuals that a relation relates to the other arguments, and their average number.
-
-        An unbound argument matches every individual.
-        """
+        """Return an expression for the individuals related to the other arguments, any if unbound, and their average number."""
         position = list(arguments).index(term)
         known = [i for i, other in enumerate(arguments) if i != position and other not in unbound]
         name = "_".join(map(str, (identifier("adjacent", relation), position, *known)))

@@ -182,10 +182,7 @@ class _PlanExecution:
         return True
 
     def restless(self, marks: Sequence[int]) -> Iterator[tuple[Symbol, str, str]]:
-        """Yield the symbols that aren't at rest and whose value has changed since one of the marks of the log.
-
-        Each symbol comes with its value and its rest value.
-        """
+        """Yield the symbols that aren't at rest and have changed since a mark of the log, with their values and rest values."""
         first, now = marks[0] if marks else len(self.facts.log), self.facts.value
         changed = {
             (situation, arguments) for situation, arguments, _ in self.facts.log[first:] if situation in self.rests
@@ -364,10 +361,7 @@ class LoggedState:
         return {Symbol(name, key): value for name, values in self._values.items() for key, value in values.items()}
 
     def exists(self, situation: str, arguments: Arguments) -> bool:
-        """Return whether a symbol exists.
-
-        A symbol exists if it has a stated value, or if it is boolean and its arguments belong to the right classes.
-        """
+        """Return whether a symbol exists: it has a stated value, or is boolean and its arguments belong to the right classes."""
         if arguments in self._values[situation]:
             return True
         kind = self.problem.domain.situations[situation]
@@ -445,10 +439,7 @@ class BehaviorReader:
         return False
 
     def remember(self, facts: LoggedState, level: int | None = None) -> None:
-        """Make each remembered symbol true if the symbol that it keeps in memory is true.
-
-        If `level` is given, only the remembered symbols that the level sees are changed.
-        """
+        """Make each remembered symbol (that `level` sees, if given) true if the symbol that it keeps in memory is true."""
         for name, source in self.problem.domain.remembers.items():
             if level is not None and self.problem.domain.situations[name].level > level:
                 continue
@@ -520,10 +511,7 @@ class BehaviorReader:
     def satisfied(
         self, conditions: Sequence[Condition], terms: Bindings, kinds: Mapping[str, str], facts: LoggedState
     ) -> Bindings | None:
-        """Return bindings of the variables with which all conditions hold, or None if there are no such bindings.
-
-        `terms` contains the variables that are already bound.
-        """
+        """Return bindings that extend the bindings `terms` and with which all conditions hold, or None if there are none."""
         reading, bound = ConditionReader(self, terms), set(terms)
         tests = reading.conjunction(conditions, bound, kinds)
         values = [terms.get(term, term) for term in reading.places]

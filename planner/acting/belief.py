@@ -117,10 +117,7 @@ class Belief:
         return f"which is no value of {symbol.situation} ({listed})"
 
     def take_in(self, expected: State, seen: State) -> tuple[Surprise, ...]:
-        """Update the belief with an observation, and with the expected values of unobservable symbols.
-
-        Return the differences between expectation and observation.
-        """
+        """Update the belief with an observation, and with the expected values of unobservable symbols; return the differences."""
         if self.unseen is None:
             self.unseen = frozenset(s for s in expected if s not in seen and not self.boolean(s))
         now = {symbol: value for symbol, value in expected.items() if symbol in self.unseen}
@@ -143,11 +140,9 @@ class Belief:
 
     # ------------------------------------------------------------------------------------------------- knowledge of the scene
 
-    def add(self, individual: str, kinds: Iterable[str]) -> None:
+    def add(self, individual: str, kind: str) -> None:
         """Add an individual to the belief."""
-        for kind in kinds:
-            self.problem = with_individual(self.problem, individual, kind)
-            self.certain = with_individual(self.certain, individual, kind)
+        self.problem, self.certain = (with_individual(one, individual, kind) for one in (self.problem, self.certain))
         self.using = compiled(self.problem)
 
     def meet(self, found: Discovery) -> None:

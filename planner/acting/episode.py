@@ -78,10 +78,7 @@ class End(Enum):
 
 @dataclass(frozen=True)
 class Surprise:
-    """A symbol with an unexpected value.
-
-    The observed value is `None` if no value was observed; the expected value is `None` if no value was expected.
-    """
+    """A symbol with an unexpected value; None stands for no value."""
 
     symbol: Symbol
     expected: str | None
@@ -90,10 +87,7 @@ class Surprise:
 
 @dataclass(frozen=True)
 class BeliefChange:
-    """A change of a symbol's value in the executive's belief.
-
-    The new value is `None` if the symbol is no longer observable.
-    """
+    """A change of a symbol's value in the executive's belief; the value is None if the symbol is no longer observable."""
 
     seconds: float
     symbol: Symbol

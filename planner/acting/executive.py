@@ -19,7 +19,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from time import perf_counter
 
-from confab.planner.acting.agenda import Postponed, RemainingSteps
+from confab.planner.acting.agenda import Postponed, RemainingSteps, chains_of, tree_of, without
 from confab.planner.acting.belief import UNSEEN, Belief
 from confab.planner.acting.episode import (
     End,
@@ -36,7 +36,6 @@ from confab.planner.acting.failure_memory import Caution, refuted_by, relied_on_
 from confab.planner.acting.record import Record
 from confab.planner.acting.repair import difference, repair_or_replan, replan, vanished
 from confab.planner.acting.retries import DEFAULT, Retries, RetryPolicy
-from confab.planner.acting.step_trees import chains_of, tree_of, without
 from confab.planner.acting.unreached import blamed, blocked, with_discoveries
 from confab.planner.acting.world import INTERRUPTED, WITHOUT_EFFECT, Guarded, Verdict, World, WorldError, WorldReport
 from confab.planner.hierarchical.planner import plan as hierarchical_plan
@@ -211,10 +210,7 @@ class _RunningEpisode:
     # --------------------------------------------------------------------------------------------------- acting
 
     def expected(self) -> dict[Symbol, str] | None:
-        """Return the situation that is expected after the next primitive.
-
-        Return None if the precondition of the primitive doesn't hold.
-        """
+        """Return the situation expected after the next primitive, or None if the primitive's precondition doesn't hold."""
         step, problem = next(chains_of(self.agenda.steps))[-1], self.belief.task
         after = followed(problem, [step], problem.initial)
         return None if after is None else {symbol: value for symbol, value in after.items() if value != UNSEEN}
@@ -371,7 +367,7 @@ class _RunningEpisode:
             goal.pop(intervention.symbol, None)
             self.goals.forget([intervention.symbol])
         elif intervention.change is InterventionKind.ADD:
-            self.belief.add(intervention.individual, (intervention.kind,))
+            self.belief.add(intervention.individual, intervention.kind)
         if goal != self.belief.problem.goal:
             self.belief.want(goal)
             self.request_replan("the goals have changed")
@@ -512,10 +508,7 @@ class _RunningEpisode:
     # ---------------------------------------------------------------------------------------------------- failures
 
     def learn_from(self, chain: tuple[Step, ...], before: State, verdict: Verdict) -> None:
-        """Handle a failed behaviour: retry it first, then look for an alternative.
-
-        After repeated failures, the behaviour counts as impossible for the rest of the episode.
-        """
+        """Handle a failed behaviour: retry it, then look for an alternative; later, it counts as impossible."""
         step, code, belief, record = chain[-1], verdict.code or "failed", self.belief, self.record
         if code == INTERRUPTED:
             self.request_replan(verdict.message)

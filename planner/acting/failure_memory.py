@@ -59,10 +59,7 @@ class Caution:
         return Caution({fact: (a[0] + b[0], a[1] + b[1]) for fact, (a, b) in pairs.items()})
 
     def applied(self, problem: Problem, planner: Planner, limits: Limits = Limits()) -> Problem:  # noqa: B008 - frozen
-        """Return the problem without doubtful facts.
-
-        A doubtful fact is removed only if a plan without the fact exists; the most doubtful facts are tried first.
-        """
+        """Return the problem without doubtful facts, the most doubtful first, as far as plans without them exist."""
         end = limits.end()
         doubtful = [fact for fact in self.counts if self.failure_probability(fact) > DOUBTFUL]
         for fact in sorted(doubtful, key=lambda fact: (-self.failure_probability(fact), fact)):

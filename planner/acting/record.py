@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from confab.planner.acting.agenda import tree_of
 from confab.planner.acting.discovery import Discovery
 from confab.planner.acting.episode import (
     BeliefChange,
@@ -15,7 +16,6 @@ from confab.planner.acting.episode import (
     Replan,
     changes,
 )
-from confab.planner.acting.step_trees import tree_of
 from confab.planner.plan import Plan, Reason, Step
 from confab.reasoner.refutations import Refutation
 from confab.reasoner.symbols import Problem, State

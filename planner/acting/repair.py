@@ -44,10 +44,7 @@ SHARE = 0.5
 
 @dataclass(frozen=True)
 class RepairResult:
-    """The remaining steps after a repair or a new plan, and the way in which they were found.
-
-    `steps` is None if no plan was found.
-    """
+    """The remaining steps after a repair or a new plan, None if no plan was found, and the way in which they were found."""
 
     kind: str
     steps: tuple[Step, ...] | None
@@ -367,10 +364,7 @@ def _effects(call: Call, step: Step) -> dict[Cell, str]:
 
 
 def _last_steps(call: Call) -> set[int]:
-    """Return the positions of steps: for each open goal, the last step that changes the goal's symbol.
-
-    Consecutive steps below the first level count as one group.
-    """
+    """Return the positions of the last steps that change open goals; consecutive steps below the first level count as one group."""
     start, first = call.problem.initial, call.program.levels[0]
     last: dict[Cell, int] = {}
     together: dict[int, set[int]] = {}

@@ -20,10 +20,7 @@ FaultInjection = Callable[[Step, State], WorldReport | None]
 
 
 class SymbolicWorld:
-    """A world in which every primitive takes its duration, one second by default, and then has its effects.
-
-    The world begins in the initial state of the problem.
-    """
+    """A world that begins in a problem's initial state; a primitive takes its duration (one second) and then has its effects."""
 
     measured = False
     """Whether the clock is measured: durations in this world are assumed, so that nothing is learned from them."""

@@ -37,10 +37,7 @@ class WorldError(Exception):
 
 
 class Verdict(Protocol):
-    """The world's report on a primitive.
-
-    The next observation, and not the verdict, decides whether the effects of the primitive hold.
-    """
+    """The world's report on a primitive; the next observation decides whether the primitive's effects hold."""
 
     @property
     def ok(self) -> bool:
@@ -80,10 +77,7 @@ class World(Protocol):
         """Execute a primitive and return when it has ended, failed, or was stopped."""
 
     def stop(self) -> None:
-        """Stop the running primitive, so that `execute` returns with the code `INTERRUPTED`.
-
-        Return at once; never raise an exception.
-        """
+        """Stop the running primitive, so that `execute` returns `INTERRUPTED`; return at once, and never raise an exception."""
 
     @property
     def seconds(self) -> float:
@@ -117,19 +111,13 @@ class Discoverer(Protocol):
     """A world that discovers individuals that the scene doesn't contain."""
 
     def discoveries(self) -> Sequence[Discovery]:
-        """Return the discoveries since the last call.
-
-        After this call, observations may name the discovered individuals.
-        """
+        """Return the discoveries since the last call; observations may then name the discovered individuals."""
 
     def free_spots(self) -> Sequence[Discovery]:
         """Return free spots for putting objects down; the executive asks once, when the places of the scene don't suffice."""
 
     def why_unplaced(self, individual: str) -> str:
-        """Return the reason why an object has no perceived place, for example ``lies 4 cm from shelf``.
-
-        Return an empty text if the reason is unknown.
-        """
+        """Return why an object has no perceived place, for example ``lies 4 cm from shelf``; empty if unknown."""
 
 
 @dataclass(frozen=True)

@@ -90,10 +90,7 @@ class Advisor:
         joins: dict[str, Bind | None] | None = None,
         also: Iterable[LearnedRule] = (),
     ) -> RulePolicy:
-        """Return the rules for a call, with scores of rules and of the individuals in their roles.
-
-        `joins` contains compiled rules, as in `RulePolicy`.
-        """
+        """Return the rules for a call, with scores of rules and of individuals in roles; for `joins`, see `RulePolicy`."""
         reader = cache(lambda: FactReader(call.program, call.table, call.goal))
 
         def score(instance: RuleInstance) -> float:

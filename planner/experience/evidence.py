@@ -146,10 +146,7 @@ class Scorer:
         self._asked: dict[str, frozenset[str]] = {}
 
     def weights(self, rule: LearnedRule | Method) -> Mapping[RoleFact, float]:
-        """Return the contribution of each counted fact to the cogency of a rule, in ln odds.
-
-        The contribution of the rule itself is always included.
-        """
+        """Return the contributions of a rule itself, and of each counted fact, to the cogency of the rule, in ln odds."""
         found = self._weights.get(rule.name)
         if found is None:
             counted = self.totals.get(rule.name, {})

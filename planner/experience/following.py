@@ -212,10 +212,7 @@ class RulePolicy:
         return level != self.first or all(self.instances.distance(level, (cell, kept[cell])) < inf for cell in undone)
 
     def deviation(self, goal: Goal) -> float:
-        """Return the distance of an amount from its goal, or the number of wrong facts of a defined goal.
-
-        The result is zero for all other goals.
-        """
+        """Return the distance of an amount from its goal, the number of wrong facts of a defined goal, otherwise zero."""
         (situation, key), value = goal
         if situation in self.call.program.rules:
             return len(self.call.space.subgoals.defining(situation, key, value == TRUE, self.call.program.levels[-1]))
@@ -253,10 +250,7 @@ class RulePolicy:
         return None if step is None else [*steps, step]
 
     def achieve_condition(self, level: int, instance: RuleInstance, above: tuple[Goal, ...]) -> Steps | None:
-        """Achieve one unmet condition of a rule instance so that the other unmet conditions remain reachable.
-
-        Return None if the rules achieve no unmet condition.
-        """
+        """Achieve an unmet condition of an instance so that the others remain reachable; return None if the rules achieve none."""
         conditions, named, table = self.instances.achievers[instance.rule.name].soft, instance.named, self.call.table
         goals = dict[int, list[Goal]]()
         cost = dict[Goal, float]()
@@ -292,10 +286,7 @@ class RulePolicy:
         return None
 
     def suffices(self, instance: RuleInstance, position: int, goal: Goal) -> bool:
-        """Return whether achieving a goal suffices to satisfy an unmet condition.
-
-        Goals about amounts and defined situation types aren't tested; the result is then true.
-        """
+        """Return whether achieving a goal satisfies an unmet condition; true, untested, for amounts and defined situation types."""
         table, achiever, program = self.call.table, self.instances.achievers[instance.rule.name], self.call.program
         if goal[0][0] in program.rules or program.domain.situations[goal[0][0]].quantity is not None:
             return True
@@ -360,10 +351,7 @@ class RulePolicy:
         return steps
 
     def achieve_nearest(self, level: int, subgoals: Sequence[Goal]) -> Steps | None:
-        """Achieve the cheapest subgoal that keeps the other subgoals of similar or lower cost reachable.
-
-        Return None if there is no such subgoal.
-        """
+        """Achieve the cheapest subgoal that keeps other subgoals of such costs reachable, or return None if there is none."""
         table, cost = self.call.table, {goal: self.instances.distance(level, goal) for goal in subgoals}
         for goal in sorted((goal for goal in subgoals if cost[goal] < inf), key=cost.__getitem__):
             near = [other for other in subgoals if other != goal and cost[other] <= cost[goal] + SLACK]
@@ -409,10 +397,7 @@ def rules_in(experience: Experience) -> list[LearnedRule]:
 
 
 def usable(experience: Experience) -> list[LearnedOrder]:
-    """Return the orders of goals that nearly all plans had.
-
-    Orders between goals without a common individual are returned only if the goals have different situation types.
-    """
+    """Return the orders of goals that nearly all plans had; goals of one situation type must have a common individual."""
     counts = experience.totals()
     found = []
     for name, order in sorted(experience.said.items()):
@@ -429,10 +414,7 @@ def usable(experience: Experience) -> list[LearnedOrder]:
 
 
 def fact(condition: Condition, named: Mapping[str, str]) -> Fact | None:
-    """Return the fact that a positive value condition requires, with roles replaced by individuals.
-
-    Return None for any other condition.
-    """
+    """Return the fact that a positive value condition requires, with individuals in the roles; None for other conditions."""
     if not isinstance(condition, ValueCondition) or condition.negated:
         return None
     arguments = tuple([named.get(a, a) for a in condition.arguments])

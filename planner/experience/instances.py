@@ -124,10 +124,7 @@ class Instances:
     def fillings(
         self, rule: LearnedRule, cell: Cell, value: str, suggested_or_not: bool
     ) -> Iterator[tuple[Roles, tuple[int, ...]]]:
-        """Return individuals for the roles of a rule, with the positions of the rule's unmet conditions.
-
-        The rule is compiled at its first use.
-        """
+        """Return individuals for the roles of a rule, with the unmet conditions; the rule is compiled at its first use."""
         name, program = rule.name, self.call.program
         if name not in self.finds:
             conditions = soft(rule, program.problem)
@@ -254,10 +251,7 @@ class Instances:
                 return
 
     def cheapest(self, level: int, goal: Goal, below: float = inf) -> Iterator[tuple[int, RuleInstance]]:
-        """Yield at most `TRIES` rule instances for a goal, each with its cost, the best first.
-
-        Costs are computed on demand.
-        """
+        """Yield at most `TRIES` rule instances for a goal with their costs, the best first; costs are computed on demand."""
         ranked = ((cost, one) for cost, equal in self.by_cost(level, goal, below) for one in self.ranked(level, equal))
         return islice(ranked, TRIES)
 

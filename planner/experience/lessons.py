@@ -133,10 +133,7 @@ def changes(call: Call, ground: Ground) -> tuple[tuple[str, ...], Sequence[Chang
 
 
 def on_one_level(steps: Sequence[Step]) -> list[Step]:
-    """Return the steps of the lowest level: each step of a higher level is replaced by its refinement.
-
-    Refinements also change symbols that the higher level doesn't see.
-    """
+    """Return steps of the lowest level in place of others, since refinements also change symbols that upper levels don't see."""
     found, lowest = list(steps), max((step.level for step in steps), default=0)
     while any(step.level < lowest for step in found):
         found = [inner for step in found for inner in (step.steps if step.level < lowest else (step,))]
@@ -289,10 +286,7 @@ def trace_of(call: Call, mark: int, targets: Mapping[Cell, str], keep: Keep, don
 
 
 def method_of(methods: Methods, step: Step, own: tuple[str, ...]) -> tuple[Method, Roles]:
-    """Return a step's refinement as a method, and the individual of each role.
-
-    The individual is None for roles that the current state determines.
-    """
+    """Return a step's refinement as a method, and the individual of each role, None where the current state determines it."""
     method = methods.lifted(step.behavior, grounds(step.steps), own)
     filled = dict(zip(range(len(own)), own, strict=True))
     for (_, places), (_, arguments) in zip(method.steps, grounds(step.steps), strict=True):

@@ -153,10 +153,7 @@ class PlanTrace:
     # -------------------------------------------------------------------------------------------------------- regressing
 
     def rules_of(self) -> Iterator[LearnedRule]:
-        """Yield a rule for each change of a step that a goal or a later step needs.
-
-        After the last rule, the facts of the trace are those of the initial state.
-        """
+        """Yield a rule for each needed change of a step; afterwards, the facts of the trace are those of the initial state."""
         later, facts = self.facts, LoggedState(self.problem, self.problem.initial)
         for done in self.done:
             for situation, key, value, _ in done.changes:
@@ -168,13 +165,13 @@ class PlanTrace:
         }
         for done in reversed(self.done):
             check("learning")
-            undo(facts, done.mark)
+            facts.undo(done.mark)
             before, achieved = self.needed(need, done, facts, later)
             if achieved:
                 yield from self.links(done, achieved, facts, later)
                 others = (rest for _, rest in self.hindered(achieved, facts))
                 need = {c: None for c in (*before, *others) if not isinstance(c, (*STATIC, EqualityCondition))}
-            undo(later, done.mark)
+            later.undo(done.mark)
 
     def needed(
         self, after: Iterable[Condition], done: ExecutedStep, facts: LoggedState, later: LoggedState
@@ -189,10 +186,7 @@ class PlanTrace:
         tries = BINDINGS
 
         def rests(c: Condition, above: tuple[Condition, ...]) -> list[tuple[Condition, bool]] | None:
-            """Return the conditions of a derivation of `c`, each with a flag: whether the condition holds before the step.
-
-            Return None if every derivation is circular.
-            """
+            """Return a derivation's conditions, and whether each holds before the step; None if every derivation is circular."""
             nonlocal tries
             if self.rules.satisfied([c], {}, {}, facts) is not None:
                 return [(c, True)]
@@ -254,10 +248,7 @@ class PlanTrace:
                     yield rule
 
     def aimed(self, goal: ValueCondition, facts: LoggedState) -> ValueCondition:
-        """Return the goal of a rule; for an amount, replace the value by the direction of the change.
-
-        Equal amounts seldom occur in other problems.
-        """
+        """Return the goal of a rule: of an amount, the direction of its change, since equal amounts are rare in other problems."""
         if self.problem.domain.situations[goal.situation].quantity is None:
             return goal
         return replace(goal, value=towards(facts.value(goal.situation, goal.arguments), goal.value))
@@ -291,10 +282,7 @@ class PlanTrace:
     def lifted(
         self, goal: ValueCondition, need: Sequence[Condition], step: Ground, order: Sequence[str]
     ) -> LearnedRule | None:
-        """Return a rule in which individuals are replaced by roles and implied conditions are removed.
-
-        Return None if memory files can't express a condition.
-        """
+        """Return a rule with roles and without implied conditions, or None if memory files can't express a condition."""
         members = self.problem.members
         if not all(isinstance(inner, WRITABLE) for c in need if not isinstance(c, Comparison) for inner in walk(c)):
             return None
@@ -405,14 +393,6 @@ def asked(condition: Condition) -> Iterator[ValueCondition | Amount]:
             yield inner
         elif isinstance(inner, Comparison):
             yield from (i for e in (inner.left, inner.right) for i in inside(e) if isinstance(i, Amount))
-
-
-def undo(facts: LoggedState, mark: int) -> None:
-    """Undo the changes that were made after the log had the length `mark`."""
-    while len(facts.log) > mark:
-        situation, key, old = facts.log[-1]
-        facts.put(situation, key, old)
-        del facts.log[-2:]
 
 
 def ordered_inside(condition: Condition) -> Condition:

@@ -166,13 +166,14 @@ def step_by_step(call: Call, limits: Limits, why: str) -> Outcome:
 
     The number of states is bounded, because each behaviour is tried in each state.
     """
-    from confab.planner.paper.hierarchy import flat
+    from confab.planner.paper.hierarchy import plan as paper
 
     lowest = call.program.levels[-1]
     states = min(limits.expansions, TRIALS // max(call.program.size(lowest), 1))
     if not states:
         return Outcome(Status.GAVE_UP, reason=Reason(why))
-    found = flat(call.problem, lowest, limits=replace(limits, expansions=states).until(call.space.deadline))
+    bounded = replace(limits, expansions=states).until(call.space.deadline)
+    found = paper(call.problem, limits=bounded, levels=[lowest])
     call.count(found)
     return found if found.plan is not None else replace(found, status=Status.GAVE_UP, reason=Reason(why))
 

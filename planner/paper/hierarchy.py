@@ -13,13 +13,13 @@ planner searches the level below for the goal.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import TypeAlias
 
 from confab.planner.paper.astar import Goal, SearchResult, a_star, mismatches
-from confab.planner.paper.cogency import PAPER, PaperConstants, cogencies, ranking
+from confab.planner.paper.cogency import PAPER, cogencies, ranking
 from confab.planner.paper.transitions import Applied, Model, Values, ground
 from confab.planner.plan import Counts, Limits, Outcome, Plan, Reason, Status, Step, UnsolvableError, renumbered
 from confab.reasoner.limits import OutOfTimeError
@@ -49,12 +49,11 @@ Refined: TypeAlias = "tuple[Step, Values] | None"
 
 @dataclass
 class PaperCall:
-    """One planning call: the compiled problem, the memory, the constants, the limits, the stored refinements and the counts."""
+    """One planning call: the compiled problem, the memory, the limits, the stored refinements and the counts."""
 
     model: Model
     grounds: Mapping[int, tuple[GroundBehavior, ...]]
     links: Links
-    constants: PaperConstants
     limits: Limits
     deadline: float | None
     proof: Proof
@@ -73,11 +72,11 @@ def unproved(problem: Problem, states: int, deadline: float | None) -> None:
 def plan(
     problem: Problem,
     links: Links | None = None,
-    constants: PaperConstants = PAPER,
     limits: Limits = Limits(),  # noqa: B008 - frozen
     grounds: Mapping[int, tuple[GroundBehavior, ...]] | None = None,
     leave_levels: bool = True,
     proof: Proof = unproved,
+    levels: Sequence[int] | None = None,
 ) -> Outcome:
     """Plan as the paper does, with A* and eq. (5) on each level, and a refinement of each step on the next level.
 
@@ -86,7 +85,6 @@ def plan(
     problem : Problem
     links : Links, optional
         The confabulation memory, by default empty.
-    constants : PaperConstants
     limits : Limits
         Maximum number of expansions of each search, and seconds of the whole call.
     grounds : mapping of level to quantified behaviours, optional
@@ -95,10 +93,20 @@ def plan(
         Whether the planner searches the level below for the goal if a level has no plan with refinements.
     proof : Proof
         Function that tries to prove unsolvability, after `DOUBT` expansions and again later with a larger number of states.
+    levels : sequence of int, optional
+        The levels on which the planner searches, by default all levels; a single level is searched without refinement.
     """
     begin = perf_counter()
-    levels = problem.domain.levels
-    call = _call(problem, levels, links, constants, limits, grounds, proof)
+    levels = levels or problem.domain.levels
+    call = PaperCall(
+        model=Model(problem),
+        grounds=grounds or {level: ground(problem, level) for level in levels},
+        links=links or Links(),
+        limits=limits,
+        deadline=limits.end(),
+        proof=proof,
+        counts={level: Counts() for level in levels},
+    )
     steps = None
     for level in levels:
         try:
@@ -118,43 +126,6 @@ def plan(
             lacks = f", which doesn't know {', '.join(unseen)}," if unseen else ""
             call.given_up.append(f"level {level}{lacks} was given up: no plan of it was found that can be refined")
     return _outcome(call, steps, perf_counter() - begin)
-
-
-def flat(
-    problem: Problem,
-    level: int,
-    links: Links | None = None,
-    constants: PaperConstants = PAPER,
-    limits: Limits = Limits(),  # noqa: B008 - frozen
-) -> Outcome:
-    """Search one level without refinement, with the same function f as the hierarchical planner.
-
-    The result serves as a comparison with the hierarchical planner.
-    """
-    begin = perf_counter()
-    call = _call(problem, (level,), links, constants, limits, None, unproved)
-    return _outcome(call, task(call, level), perf_counter() - begin)
-
-
-def _call(
-    problem: Problem,
-    levels: tuple[int, ...],
-    links: Links | None,
-    constants: PaperConstants,
-    limits: Limits,
-    grounds: Mapping[int, tuple[GroundBehavior, ...]] | None,
-    proof: Proof,
-) -> PaperCall:
-    return PaperCall(
-        model=Model(problem),
-        grounds=grounds or {level: ground(problem, level) for level in levels},
-        links=links or Links(),
-        constants=constants,
-        limits=limits,
-        deadline=limits.end(),
-        proof=proof,
-        counts={level: Counts() for level in levels},
-    )
 
 
 def task(call: PaperCall, level: int) -> list[Step] | None:
@@ -189,10 +160,7 @@ class Target:
 
 
 def target(model: Model, above: int, level: int, before: Values, said: Goal) -> Target:
-    """Return the target of a level.
-
-    The target contains the values `said` by the level above, and the rest values of symbols that the level above doesn't see.
-    """
+    """Return the target of a level: the values `said` by the level above, and rest values of symbols that it doesn't see."""
     values, restless = dict(said), dict[int, str]()
     for i, symbol in enumerate(model.symbols):
         rest = model.problem.domain.situations[symbol.situation].rest
@@ -229,10 +197,7 @@ def solve(call: PaperCall, level: int, start: Values, wanted: Target) -> tuple[l
 
 
 def refine(call: PaperCall, level: int, state: Values, ground: GroundBehavior) -> Refined:
-    """Return a step with its refinement, and the state after the refinement.
-
-    Return None if the behaviour isn't applicable or has no refinement.
-    """
+    """Return a step with its refinement and the state after it, or None if the behaviour isn't applicable or has none."""
     if (state, ground) in call.known:
         return call.known[state, ground]
     applied = call.model.apply(ground, state)
@@ -284,7 +249,7 @@ def search(call: PaperCall, level: int, start: Values, wanted: Target) -> Search
         successors=successors,
         cost=call.model.cost,
         rank=lambda state: rank(state[:size]),
-        bonus=call.constants.bonus,
+        bonus=PAPER.bonus,
         limits=call.limits,
     )
     call.counts[level].add(found.counts)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from confab.planner.paper.cogency import PAPER, PaperConstants, situation
+from confab.planner.paper.cogency import PAPER, situation
 from confab.planner.paper.transitions import Model, Values
 from confab.planner.plan import Plan, Step
 from confab.reasoner.limits import check
@@ -16,7 +16,7 @@ from confab.reasoner.memory.links import Conclusion, Links
 from confab.reasoner.symbols import GroundBehavior, Problem, State
 
 
-def learn(problem: Problem, plan: Plan, links: Links, constants: PaperConstants = PAPER) -> Links:
+def learn(problem: Problem, plan: Plan, links: Links) -> Links:
     """Return the links after one successful execution of a plan from the initial state, without changing the given links.
 
     A plan without refinements teaches only the level of its steps.
@@ -28,11 +28,11 @@ def learn(problem: Problem, plan: Plan, links: Links, constants: PaperConstants 
     """
     learned = Links({c: {s: dict(t) for s, t in symbols.items()} for c, symbols in links.tables.items()})
     model = Model(problem)
-    _learn_steps(model, plan.steps, model.values(problem.initial), learned, constants)
+    _learn_steps(model, plan.steps, model.values(problem.initial), learned)
     return learned
 
 
-def _learn_steps(model: Model, steps: Sequence[Step], start: Values, links: Links, constants: PaperConstants) -> Values:
+def _learn_steps(model: Model, steps: Sequence[Step], start: Values, links: Links) -> Values:
     state = start
     for step in steps:
         now = state
@@ -43,9 +43,9 @@ def _learn_steps(model: Model, steps: Sequence[Step], start: Values, links: Link
                     f"step {'.'.join(map(str, step.path))} ({step}): its preconditions don't hold there"
                 )
             conclusion = (one.behavior, one.arguments)
-            reinforce(links, conclusion, model.state(now), model.problem, one.level, constants.learning)
+            reinforce(links, conclusion, model.state(now), model.problem, one.level, PAPER.learning)
             now = applied.after
-        state = _learn_steps(model, step.steps, state, links, constants) if step.steps else now
+        state = _learn_steps(model, step.steps, state, links) if step.steps else now
     return state
 
 

@@ -95,10 +95,7 @@ class Model:
         return float(self.prices[name](*applied.ground.arguments, *variables))
 
     def successors(self, grounds: Iterable[GroundBehavior], values: Values) -> Iterator[Applied]:
-        """Yield the application of each quantified behaviour that is applicable and changes the state.
-
-        The applications have the order of `grounds`.
-        """
+        """Yield, in the order of `grounds`, the application of each behaviour that is applicable and changes the state."""
         for ground in grounds:
             applied = self.apply(ground, values)
             if applied is not None and applied.after != values:
