@@ -33,8 +33,9 @@ def certified(problem: Problem, outcome: Outcome) -> Outcome:
 
     why = "no certificate was found within the work limit"
     examined = outcome.reason is not None and outcome.reason.states > 0
-    for find in (lambda: outcome.certificate, lambda: certify(problem, few_states=examined)):
-        if (certificate := find()) is None:
+    for given in (True, False):
+        certificate = outcome.certificate if given else certify(problem, few_states=examined)
+        if certificate is None:
             continue
         if (refused := refusal(problem, certificate)) is None:
             reason = _added_up(problem, certificate) or told(problem, certificate)
