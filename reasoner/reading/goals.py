@@ -15,7 +15,7 @@ from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.language import is_variable, terms, walk
 from confab.reasoner.names import nearest
 from confab.reasoner.reading.parts import Parts
-from confab.reasoner.reading.rows import is_a
+from confab.reasoner.reading.rows import competing_goals, is_a
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -147,11 +147,12 @@ def with_task(problem: Problem, parts: Parts, tasks: Iterable[str]) -> Problem:
         Two goals contradict each other, or a goal mentions an individual that isn't in the scene.
     """
     goal, weights = dict[Symbol, str](), dict[Symbol, Fraction]()
+    competing = competing_goals(parts.nodes)
     for task in tasks:
         goals = parts.values(task, "goal")
         for iri, wanted in ((goal, one) for goal in goals for one in _wanted(parts, goal, problem.classes)):
             weight = _weight(parts, iri)
-            if not _is_fact(wanted, problem):
+            if iri in competing or not _is_fact(wanted, problem):
                 problem, symbol = with_derived_goal(problem, parts.names.short(task), parts.names.short(iri), wanted)
                 goal[symbol] = TRUE
                 weights |= {} if weight is None else {symbol: weight}
@@ -171,7 +172,7 @@ def with_task(problem: Problem, parts: Parts, tasks: Iterable[str]) -> Problem:
             assert isinstance(wanted, ValueCondition)
             symbol = Symbol(wanted.situation, wanted.arguments)
             check_arguments(symbol, problem.domain, "a goal")
-            value = _wanted_value(iri, symbol, wanted, problem)
+            value = _other_values(wanted, problem)[0] if wanted.negated else wanted.value
             kind = problem.domain.situations[symbol.situation]
             members = (problem.classes.get(of, ()) for of in kind.arguments)
             if value == FALSE and not all(a in its for a, its in zip(symbol.arguments, members, strict=True)):
@@ -202,8 +203,8 @@ def _weight(parts: Parts, iri: str) -> Fraction | None:
 def _is_fact(wanted: Condition, problem: Problem) -> bool:
     """Return whether a goal is equivalent to a fact: the value of a symbol, or bounds of an amount that the state contains."""
     match wanted:
-        case ValueCondition():
-            return True
+        case ValueCondition(negated=negated):
+            return not negated or len(_other_values(wanted, problem)) == 1
         case Comparison(Amount(situation), sign, Fraction(), negated):
             aggregates = problem.domain.aggregates
             return (situation not in aggregates or aggregates[situation].kept) and not (negated and sign == "=")
@@ -234,36 +235,25 @@ def with_derived_goal(problem: Problem, task: str, name: str, wanted: Condition)
     return replace(problem, domain=more, classes=classes), Symbol(free, (task,))
 
 
-def _wanted_value(iri: str, symbol: Symbol, wanted: ValueCondition, problem: Problem) -> str:
-    """Return the wanted value of a goal.
+def _other_values(excluded: ValueCondition, problem: Problem) -> list[str]:
+    """Return the values that the symbol of a condition can have instead of the condition's value.
 
-    The wanted value of a negated goal is the symbol's only other value. The values are counted on the lowest level that has the
-    symbol and the excluded value.
-
-    Raises
-    ------
-    KnowledgeError
-        The goal is negated, and its symbol has several other values.
+    The values are counted on the lowest level that has the symbol and the condition's value.
     """
-    if not wanted.negated:
-        return wanted.value
-    situation = problem.domain.situations[wanted.situation]
-    if situation.boolean:
-        return FALSE if wanted.value == TRUE else TRUE
-    level = max(problem.first_level(symbol), problem.value_levels.get(wanted.value, 1))
-    left = [value for value in problem.values(symbol, level) if value != wanted.value]
-    if len(left) != 1:
-        raise KnowledgeError(
-            f"<{iri}>: the goal excludes a value of {wanted.situation}; the remaining values are {some_of(left) or 'none'}; "
-            "state the "
-            "wanted value, or several values as alternatives (c:AnyOf)"
-        )
-    return left[0]
+    check_arguments(symbol := Symbol(excluded.situation, excluded.arguments), problem.domain, "a goal")
+    if problem.domain.situations[excluded.situation].boolean:
+        return [FALSE if excluded.value == TRUE else TRUE]
+    level = max(problem.first_level(symbol), problem.value_levels.get(excluded.value, 1))
+    return [value for value in problem.values(symbol, level) if value != excluded.value]
 
 
 def _wanted(parts: Parts, iri: str, classes: Mapping[str, tuple[str, ...]]) -> list[Condition]:
-    """Return the goals that a goal node denotes: if an argument of the node is a class, one goal for each member of the class."""
-    if iri in parts.nodes and is_a(parts.nodes[iri], "AllOf") and not parts.flag(iri, "negated"):
+    """Return the goals that a goal node denotes.
+
+    If an argument of the node is a class, there is one goal for each member of the class. A hard conjunction denotes its conjuncts.
+    """
+    node = parts.nodes.get(iri, {})
+    if is_a(node, "AllOf") and not parts.flag(iri, "negated") and not parts.values(iri, "weight"):
         return list(parts.conditions(iri, "condition"))
     found = parts.condition(iri)
     if not (isinstance(found, Witness) and parts.classes_in(iri)):

@@ -159,6 +159,41 @@ def test_the_command_line_and_json_name_the_unmet_soft_goals() -> None:
     assert [one["goal"] for one in data["forgone"]] == ["store STOCK 0"]
 
 
+GLASS = "c:ValueCondition ; {}c:about :glass ; c:situationType d:IN ; c:value :{}"
+STOCK = 'c:Comparison ; {}c:about :store ; c:situationType d:STOCK ; c:sign "{}" ; c:amount {}'
+
+
+@pytest.mark.parametrize(
+    ("goals", "unmet"),
+    [
+        ((GLASS.format("c:weight 50.0 ; ", "shop"), GLASS.format("c:weight 1.0 ; ", "store")), [1]),
+        ((GLASS.format("", "shop"), GLASS.format("c:weight 0.5 ; ", "shop")), []),
+        ((GLASS.format("c:weight 0.5 ; ", "shop"), GLASS.format("c:weight 500.0 ; ", "cart")), [Fraction(1, 2)]),
+        ((STOCK.format("c:weight 1.0 ; ", "<=", "0.0"), STOCK.format("c:weight 1.0 ; ", "<=", "1.0")), [1, 1]),
+        (
+            (GLASS.format("c:negated true ; c:weight 0.5 ; ", "store"), STOCK.format("c:weight 0.5 ; ", "<", "3.0")),
+            [Fraction(1, 2)],
+        ),
+        (
+            ("c:AllOf ; c:weight 1.5 ; c:condition :order.shop, :order.empty", GLASS.format("c:weight 1.0 ; ", "shop")),
+            [1, Fraction(3, 2)],
+        ),
+    ],
+    ids=["two values", "hard and soft", "the dearer value", "two bounds", "an excluded value", "a conjunction"],
+)
+def test_each_goal_with_a_weight_counts_once_whatever_other_goals_require_of_its_object(
+    goals: tuple[str, ...], unmet: list[Fraction], tmp_path: Path
+) -> None:
+    head, rest = SCENE[: SCENE.index(":order.goal2 a")], SCENE[SCENE.index("[ a owl:AllDifferent") :]
+    parts = f":order.shop a {GLASS.format('', 'shop')} .\n:order.empty a {STOCK.format('', '=', '0.0')} .\n"
+    said = "".join(f":order.goal{n} a owl:NamedIndividual, {goal} .\n" for n, goal in enumerate(goals, 2))
+    (tmp_path / "scene.ttl").write_text(head + said + parts + rest, "utf-8")
+    for options in ({}, {"optimal": True}):
+        result = confab.load(tmp_path / "scene.ttl").plan(**options)
+        assert sorted(one.weight for one in result.outcome.forgone) == unmet
+        assert not result.faults(result.plan)
+
+
 def test_execution_leaves_the_same_goals_unmet() -> None:
     scene = confab.load("wishes-small")
     done = scene.execute()
