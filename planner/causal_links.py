@@ -21,7 +21,7 @@ from typing import TypeVar
 from confab.planner.checked_conditions import Arguments
 from confab.planner.plan import Plan, Step
 from confab.planner.validation import BehaviorReader, Cell, LoggedState
-from confab.reasoner.amounts import meets, written
+from confab.reasoner.amounts import meets
 from confab.reasoner.limits import check
 from confab.reasoner.symbols import FALSE, TRUE, Condition, Fact, Problem, Symbol, ValueCondition, substituted
 
@@ -84,11 +84,14 @@ def purposes(problem: Problem, plan: Plan) -> dict[Path, Purpose]:
 
 
 def _nearest(path: Path) -> Callable[[Need], tuple[int, Path]]:
-    """Return the sort key of a step's needs: the goal, steps of the same refinement, the step above, other steps, rest values."""
+    """Return the sort key of a step's needs.
+
+    The order is: the goal, conditions of steps of the same refinement, the step above, other steps, rest values.
+    """
     order = {NeedKind.GOAL: 0, NeedKind.ABOVE: 2, NeedKind.REST: 4}
 
     def key(need: Need) -> tuple[int, Path]:
-        beside = need.by[:-1] == path[:-1]
+        beside = need.by[:-1] == path[:-1] and need.conditions
         return order.get(need.kind, 1 if beside else 3), need.by
 
     return key
@@ -101,14 +104,6 @@ def on_level(steps: Iterable[Step], level: int) -> Iterator[Step]:
             yield step
         else:
             yield from on_level(step.steps, level)
-
-
-@dataclass
-class _Written:
-    """The step that gave a symbol its value, and the symbol's previous value."""
-
-    by: int
-    before: str
 
 
 class _NeedRecorder(LoggedState):
@@ -136,7 +131,9 @@ class _LevelExecution:
         self.steps = list(on_level(plan.steps, level))
         self.rules = BehaviorReader(problem)
         self.facts = _NeedRecorder(problem, problem.initial)
-        self.written: dict[Cell, _Written] = {}
+        self.written: dict[
+            Cell, dict[int, str]
+        ] = {}  # the steps that gave a symbol its value, with its value without each step
         self.having: dict[tuple[str, str], dict[Cell, None]] = {}  # symbols that have or had a value, by value
         self.gives: dict[Path, tuple[FactChange, ...]] = {}
         self.groups = {step.path: step for step in plan.walk() if step.steps and _least(step.steps) == level}
@@ -165,12 +162,12 @@ class _LevelExecution:
             goal = {(symbol.situation, symbol.arguments): value for symbol, value in self.problem.goal.items()}
             found += self.left((), 0, 0, 0, goal)
             found += [need for cell, value in goal.items() for need in self.derivation_givers(cell, value)]
-        needed = {(path, change.fact) for path, need in found for change in need.gives}
+        needed = {(path, change.fact.symbol) for path, need in found for change in need.gives}
         for writer, number, changes, differs in reversed(deeds):
             step = self.steps[number]
-            if any((step.path, self.fact_of(number, cell)) in needed for cell in differs):
+            if any((step.path, Symbol(*cell)) in needed for cell in differs):
                 found.append((self.steps[writer].path, Need(NeedKind.LATER, changes, step.path)))
-                needed |= {(self.steps[writer].path, change.fact) for change in changes}
+                needed |= {(self.steps[writer].path, change.fact.symbol) for change in changes}
         yield from found
 
     def changes(self, step: Step) -> dict[Cell, str] | None:
@@ -210,7 +207,7 @@ class _LevelExecution:
         self.gives[step.path] = tuple(given)
         bound = [self.bindings(one) for one, _ in self.in_turn(step)]
         for writer, without in self.writers_that_matter(
-            read, lambda cells: self.failures_without(step, cells, before, bound)
+            read, lambda without: self.failures_without(step, without, before, bound)
         ):
             yield writer, *without
 
@@ -224,29 +221,30 @@ class _LevelExecution:
         return found, read
 
     def writers_that_matter(
-        self, read: Iterable[Cell], without: Callable[[Sequence[Cell]], T | None]
+        self, read: Iterable[Cell], result: Callable[[Mapping[Cell, str]], T | None]
     ) -> Iterator[tuple[int, T]]:
-        """Yield the steps without whose changes of some symbols a result would differ, with the values of `without`.
+        """Yield the steps without whose changes of some symbols a result would differ, with the result for these values.
 
         The symbols that a step has written are tested one by one, and together if none of them matters alone.
         """
-        by: dict[int, list[Cell]] = {}
+        by: dict[int, dict[Cell, str]] = {}
         for cell in read:
-            by.setdefault(self.written[cell].by, []).append(cell)
-        for writer, cells in sorted(by.items()):
-            found = [one for cell in cells if (one := without([cell])) is not None]
-            if not found and len(cells) > 1:
-                found = [one for one in [without(cells)] if one is not None]
+            for giver, before in self.written[cell].items():
+                by.setdefault(giver, {})[cell] = before
+        for writer, without in sorted(by.items()):
+            found = [one for cell, before in without.items() if (one := result({cell: before})) is not None]
+            if not found and len(without) > 1:
+                found = [one for one in [result(without)] if one is not None]
             yield from ((writer, one) for one in found)
 
     @contextmanager
-    def reset(self, cells: Iterable[Cell]) -> Iterator[tuple[FactChange, ...]]:
-        """Give some symbols their previous values while the context is active; the context's value are their changes."""
+    def reset(self, without: Mapping[Cell, str]) -> Iterator[tuple[FactChange, ...]]:
+        """Give some symbols the values `without` while the context is active; the context's value are their changes."""
         mark = len(self.facts.log)
-        now = {cell: Fact(Symbol(*cell), str(self.facts.value(*cell))) for cell in cells}
-        for cell in cells:
-            self.facts.put(*cell, self.written[cell].before)
-        yield tuple(FactChange(fact, self.written[cell].before) for cell, fact in now.items())
+        now = {cell: Fact(Symbol(*cell), str(self.facts.value(*cell))) for cell in without}
+        for cell, before in without.items():
+            self.facts.put(*cell, before)
+        yield tuple(FactChange(fact, without[cell]) for cell, fact in now.items())
         self.facts.undo(mark)
 
     def bindings(self, step: Step) -> Mapping[str, str]:
@@ -256,17 +254,16 @@ class _LevelExecution:
         return self.rules.satisfied(behavior.preconditions, terms, behavior.kinds, self.facts) or terms
 
     def failures_without(
-        self, step: Step, cells: Sequence[Cell], before: Mapping[Cell, str], bound: Sequence[Mapping[str, str]]
+        self, step: Step, without: Mapping[Cell, str], before: Mapping[Cell, str], bound: Sequence[Mapping[str, str]]
     ) -> tuple[tuple[FactChange, ...], tuple[Condition, ...], frozenset[Cell]] | None:
-        """Return the conditions of a step that fail if the given symbols have their previous values.
+        """Return the conditions of a step that fail if symbols have the values `without`.
 
-        `bound` are the bindings of each of the steps that are refined together. Return None if the previous values don't affect the
-        step.
+        `bound` are the bindings of each of the steps that are refined together. Return None if the values don't affect the step.
         """
         check("explaining the plan")
         after: dict[Cell, str] | None = {}
         broken: list[Condition] = []
-        with self.reset(cells) as changes:
+        with self.reset(without) as changes:
             for (one, made), terms in zip(self.in_turn(step), bound, strict=False):
                 after = None if after is None or made is None else after | made
                 if made is None:
@@ -278,17 +275,35 @@ class _LevelExecution:
         differs = frozenset(
             cell
             for cell, value in before.items()
-            if after.get(cell) != value and (cell not in cells or self.counted(cell))
+            if after.get(cell) != value and (cell not in without or self.counted(cell))
         )
         return (changes, (), differs) if differs else None
 
-    def givers_of_amount(self, cell: Cell, before: str) -> _Written | None:
-        """Return the last step that changed a consumed amount, and the amount that would be left without this step."""
-        if cell not in self.written or not self.counted(cell):
-            return None
-        less = Fraction(str(self.facts.value(*cell))) - Fraction(before)
-        giver = self.written[cell]
-        return _Written(giver.by, written(Fraction(giver.before) + less)) if less < 0 else None
+    def givers(self, number: int, step: Step, cell: Cell, now: str) -> dict[int, str]:
+        """Return the steps that gave a symbol its value `now`, with the value that `step` would leave without each of them.
+
+        The givers of an amount are the last step that increased and the last step that decreased it. The state is the one before
+        `step`.
+        """
+        before = str(self.facts.value(*cell))
+        found = {number: before}
+        if self.counted(cell) and before != now:
+            rises = Fraction(before) < Fraction(now)
+            for giver, old in self.written.get(cell, {}).items():
+                if (Fraction(old) < Fraction(before)) != rises:
+                    mark = len(self.facts.log)
+                    self.facts.put(*cell, old)
+                    self.execute(step)
+                    without = str(self.facts.value(*cell))
+                    self.facts.undo(mark)
+                    found |= {giver: without} if without != now else {}
+        return found
+
+    def execute(self, step: Step) -> None:
+        """Execute a step with all its sub-steps."""
+        for primitive in Plan((step,)).primitives:
+            for cell, value in (self.changes(primitive) or {}).items():
+                self.facts.put(*cell, value)
 
     def counted(self, cell: Cell) -> bool:
         """Return whether a symbol has an amount; a step that changes an amount depends on the previous amount."""
@@ -297,15 +312,16 @@ class _LevelExecution:
     def done(self, number: int, step: Step) -> None:
         """Execute a step with all its sub-steps, and record the symbols that the step changed."""
         mark = len(self.facts.log)
-        for primitive in Plan((step,)).primitives:
-            for cell, value in (self.changes(primitive) or {}).items():
-                self.facts.put(*cell, value)
-        for cell, before in self.facts.since(mark).items():
-            if cell in self.written:
-                for value in (self.written[cell].before, before):
-                    self.having.get((cell[0], value), {}).pop(cell, None)
-            self.written[cell] = self.givers_of_amount(cell, before) or _Written(number, before)
-            for value in (before, str(self.facts.value(*cell))):
+        self.execute(step)
+        after = {cell: (before, str(self.facts.value(*cell))) for cell, before in self.facts.since(mark).items()}
+        self.facts.undo(mark)
+        givers = {cell: self.givers(number, step, cell, now) for cell, (_, now) in after.items()}
+        self.execute(step)
+        for cell, (before, now) in after.items():
+            for value in (*self.written.get(cell, {}).values(), before):
+                self.having.get((cell[0], value), {}).pop(cell, None)
+            self.written[cell] = givers[cell]
+            for value in (*self.written[cell].values(), now):
                 self.having.setdefault((cell[0], value), {})[cell] = None
 
     def left(
@@ -316,9 +332,6 @@ class _LevelExecution:
         for situation, arguments, old in self.facts.log[mark:]:
             touched.setdefault((situation, arguments), old)
         for cell, begun in touched.items():
-            written = self.written.get(cell)
-            if written is None or written.by < first:
-                continue
             symbol, value = Symbol(*cell), str(self.facts.value(*cell))
             kind = self.problem.domain.situations[symbol.situation]
             if cell in wanted and meets(value, wanted[cell]):
@@ -329,7 +342,10 @@ class _LevelExecution:
                 why = NeedKind.REST
             else:
                 continue
-            yield self.steps[written.by].path, Need(why, (FactChange(Fact(symbol, value), written.before),), path)
+            for giver, without in self.written.get(cell, {}).items():
+                met = why is not NeedKind.REST and self.counted(cell) and meets(without, wanted.get(cell, value))
+                if giver >= first and not met:
+                    yield self.steps[giver].path, Need(why, (FactChange(Fact(symbol, value), without),), path)
 
     def derivation_givers(self, cell: Cell, wanted: str) -> Iterator[tuple[Path, Need]]:
         """Yield the steps that make true the facts from which a defined goal follows.
@@ -340,18 +356,13 @@ class _LevelExecution:
             return
         _, read = self.with_reads(lambda: self.facts.value(*cell))
 
-        def lacking(cells: Sequence[Cell]) -> tuple[FactChange, ...] | None:
-            with self.reset(cells) as changes:
+        def lacking(without: Mapping[Cell, str]) -> tuple[FactChange, ...] | None:
+            with self.reset(without) as changes:
                 return changes if self.facts.value(*cell) != wanted else None
 
         for writer, changes in self.writers_that_matter(read, lacking):
             condition = ValueCondition(cell[0], cell[1], TRUE, wanted == FALSE)
             yield self.steps[writer].path, Need(NeedKind.GOAL, changes, (), (condition,))
-
-    def fact_of(self, number: int, cell: Cell) -> Fact | None:
-        """Return the fact that a step makes true for a symbol."""
-        given = self.gives.get(self.steps[number].path, ())
-        return next((c.fact for c in given if (c.fact.symbol.situation, c.fact.symbol.arguments) == cell), None)
 
 
 def _least(steps: Sequence[Step]) -> int:

@@ -7,6 +7,7 @@ from random import Random
 
 import pytest
 
+import confab
 from confab.planner.causal_links import Need, NeedKind, purposes
 from confab.planner.contrast import instead_of
 from confab.planner.hierarchical.planner import plan as default
@@ -110,3 +111,11 @@ def test_an_alternative_step_is_in_a_valid_plan_or_has_an_unmet_condition_or_a_r
     assert told["plan"] >= 5
     assert told["lacks"] >= 5
     assert told["no"] <= 0.2 * told.total()
+
+
+def test_a_step_that_takes_the_last_of_an_amount_serves_a_goal_for_little_of_it() -> None:
+    result = confab.load("carts-small").plan()
+    taken = [result.why(step) for step in result.plan.steps if step.behavior == "L1_PICK_UP"]
+    assert len(taken) == 3
+    assert ["the goal requires that store stock 0" in str(one) for one in taken] == [False, False, True]
+    assert not [one for one in taken if "no later step" in str(one)]
