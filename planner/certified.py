@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from confab.planner.plan import Outcome, Reason, Status, UngroundableError
-from confab.reasoner.limits import OutOfTimeError
+from confab.reasoner.limits import OutOfTimeError, current
 from confab.reasoner.symbols import Problem
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def certified(problem: Problem, outcome: Outcome) -> Outcome:
     from confab.planner.certificate_reasons import told
     from confab.planner.certifying import certify
 
-    why = "no certificate was found within the work limit"
+    why = ""
     examined = outcome.reason is not None and outcome.reason.states > 0
     for given in (True, False):
         certificate = outcome.certificate if given else certify(problem, few_states=examined)
@@ -42,6 +42,7 @@ def certified(problem: Problem, outcome: Outcome) -> Outcome:
             return replace(outcome, certificate=certificate, reason=reason)
         why = f"the checker refuses the certificate: {refused}"
     searched = outcome.reason.text if outcome.reason else "the search found no plan"
+    why = why or f"no certificate was found within the {'time' if current().left == 0 else 'work'} limit"
     reason = Reason(f"{searched}; this isn't certified: {why}", outcome.reason.terms if outcome.reason else ())
     return replace(outcome, status=Status.GAVE_UP, reason=reason, certificate=None)
 

@@ -20,12 +20,14 @@ with larger limits.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
 from functools import partial
 from itertools import combinations, pairwise, product
 from math import prod
 from operator import itemgetter
+from time import perf_counter
 from typing import TypeAlias
 
 from confab.planner.certificate_checks import (
@@ -429,19 +431,25 @@ def _by_states(lowest: Lowest) -> Certificate | None:
 
 
 def _with_fewer(lowest: Lowest, found: Certificate) -> Certificate:
-    """Return a certificate without superfluous symbols and goals; each is tested with a small work limit."""
-    most = min(lowest.work + FEWER, lowest.most)
+    """Return a certificate without superfluous symbols and goals; each is tested with a small work limit.
+
+    Half of the time that is left is kept for the check of the certificate.
+    """
+    most, end = min(lowest.work + FEWER, lowest.most), lowest.deadline
+    lowest.deadline = (perf_counter() + end) / 2
 
     def reduced(fewer: Certificate) -> Certificate | None:
         work = min(LITTLE[1], SHARE * (most - lowest.work))
         return _with_little(lowest, work, partial(_counted, lowest, fewer))
 
-    for symbol in sorted(found.told_apart):
-        told_apart = {s: values for s, values in found.told_apart.items() if s != symbol}
-        found = reduced(replace(found, told_apart=told_apart)) or found
-    for fact in found.unmet if len(found.unmet) > 1 else ():
-        unmet = tuple(other for other in found.unmet if other != fact)
-        found = (reduced(replace(found, unmet=unmet)) if unmet else None) or found
+    with suppress(NoTimeLeftError):
+        for symbol in sorted(found.told_apart):
+            told_apart = {s: values for s, values in found.told_apart.items() if s != symbol}
+            found = reduced(replace(found, told_apart=told_apart)) or found
+        for fact in found.unmet if len(found.unmet) > 1 else ():
+            unmet = tuple(other for other in found.unmet if other != fact)
+            found = (reduced(replace(found, unmet=unmet)) if unmet else None) or found
+    lowest.deadline = end
     return found
 
 

@@ -18,7 +18,7 @@ from confab.planner import certifying
 from confab.planner.certificate_checks import refusal
 from confab.planner.certificates import Certificate, certificate_from, certificate_json
 from confab.planner.certified import certified
-from confab.planner.certifying import certify
+from confab.planner.certifying import _with_fewer, certify, of_kind
 from confab.planner.plan import Limits, Outcome, Reason, Status
 from confab.planner.possibilities import Lowest
 from confab.planner.solve import MODES, Mode, Request, solve
@@ -340,3 +340,24 @@ def test_the_reason_why_an_amount_never_changes_names_every_behaviour_that_could
     assert (
         "L2_CHARGE requires trolley TROLLEY_AT some Dock, which never holds; so trolley BATTERY 0 always" in reason.text
     )
+
+
+def test_a_certificate_that_was_found_in_time_is_kept_if_no_time_is_left_to_remove_its_superfluous_symbols(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    found = ((problem, of_kind("states", problem)) for problem, _ in unsolvable(range(20)))
+    problem, certificate = next((problem, one) for problem, one in found if one is not None)
+    reads = 0
+
+    def clock() -> float:
+        nonlocal reads
+        reads += 1
+        return float(reads)
+
+    lowest = Lowest(problem)
+    lowest.deadline = 4.0  # passes at the second look at the clock
+    monkeypatch.setattr("confab.planner.certifying.perf_counter", clock)
+    monkeypatch.setattr("confab.planner.possibilities.perf_counter", clock)
+    monkeypatch.setattr("confab.planner.possibilities.LOOKS", 1)
+    assert _with_fewer(lowest, certificate) == certificate
+    assert refusal(problem, certificate) is None
