@@ -8,7 +8,7 @@ suitable role. The whole task is then planned again.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import product
@@ -70,19 +70,9 @@ def instead_of(
 ) -> Contrast:
     """Return the result of replacing a step of a plan by another step.
 
-    Parameters
-    ----------
-    problem : Problem
-    plan : Plan
-    behavior : Behavior
-    given : mapping of parameters to individuals
-        For each parameter that isn't given, an individual is chosen that makes the step applicable.
-    ask : callable
-        Function that plans a problem.
-    place : Step, optional
-        The step to be replaced. If the level of `behavior` is another one, the steps of this level in or above `place` are
-        candidates. By default, all steps of this level are candidates. Among the candidates in whose place `behavior` is
-        applicable, the step most similar to the requested step is replaced.
+    For each parameter that isn't `given`, an individual is chosen that makes the step applicable. Candidates for replacement are
+    all steps of the behaviour's level, or with `place`, this step or the steps of the level in or above it. Among the candidates in
+    whose place the behaviour is applicable, the step most similar to the requested step is replaced.
 
     Raises
     ------
@@ -104,20 +94,24 @@ def instead_of(
     possible: list[tuple[int, tuple[str, ...]]] = []
     for i in places:
         found = rules.satisfied(behavior.preconditions, given, behavior.kinds, LoggedState(problem, states[i]))
-        if found is not None:
-            possible += [(i, arguments) for arguments in _completed(problem, behavior, found)]
-    doable = [(i, a) for i, a in possible if successor(problem, behavior, a, states[i]) is not None]
-    if possible and not doable:
-        at, arguments = possible[0]
-        asked = Contrast(before, behavior.name, arguments, course[at])
-        lacks = _beyond(rules, behavior, arguments, states[at])
-        return replace(asked, lacks=lacks) if lacks else replace(asked, reason=NO_NUMBER)
-    possible = doable
+        if found is not None:  # a parameter that no condition determines takes each member of its class
+            taken = ((found[p.name],) if p.name in found else problem.members(p.kind) for p in behavior.parameters)
+            possible += [(i, arguments) for arguments in product(*taken)]
     if not possible:
-        return _fewest_failures(
-            rules, behavior, given, [(course[i], LoggedState(problem, states[i])) for i in places], before
-        )
-    at, arguments = max(possible, key=lambda one: (_similarity(course[one[0]], behavior, one[1]), -one[0]))
+        return _fewest_failures(rules, behavior, given, [(course[i], states[i]) for i in places], before)
+    doable = [(i, a) for i, a in possible if successor(problem, behavior, a, states[i]) is not None]
+    if not doable:
+        at, arguments = possible[0]
+        lacks = _beyond(rules, behavior, arguments, states[at])
+        return Contrast(before, behavior.name, arguments, course[at], lacks, reason=None if lacks else NO_NUMBER)
+    at, arguments = max(
+        doable,
+        key=lambda one: (
+            len({*course[one[0]].arguments} & {*one[1]}),
+            course[one[0]].behavior == behavior.name,
+            -one[0],
+        ),
+    )
     asked = Contrast(before, behavior.name, arguments, course[at])
     step, why = _refined(problem, states[at], behavior, arguments, ask)
     if step is None:
@@ -130,11 +124,6 @@ def instead_of(
     if faults := validate(problem, whole):
         return replace(asked, reason=Reason(faults[0].text))
     return replace(asked, plan=whole, cost=cost_of(problem, whole))
-
-
-def _completed(problem: Problem, behavior: Behavior, found: Bindings) -> Iterator[tuple[str, ...]]:
-    """Yield the arguments of a behaviour; a parameter that no condition determines takes each member of its class."""
-    yield from product(*((found[p.name],) if p.name in found else problem.members(p.kind) for p in behavior.parameters))
 
 
 def with_choice(problem: Problem, plan: Plan, symbol: Symbol, individual: str, ask: Ask) -> Contrast:
@@ -205,22 +194,14 @@ def _terms(behavior: Behavior, arguments: Sequence[str]) -> Bindings:
     return {p.name: argument for p, argument in zip(behavior.parameters, arguments, strict=True)}
 
 
-def _similarity(step: Step, behavior: Behavior, arguments: Sequence[str]) -> tuple[int, bool]:
-    """Return the similarity of two steps: the number of common individuals, then whether the behaviours are equal."""
-    return len({*step.arguments} & {*arguments}), step.behavior == behavior.name
-
-
 def _fewest_failures(
-    rules: BehaviorReader,
-    behavior: Behavior,
-    given: Bindings,
-    places: Sequence[tuple[Step, LoggedState]],
-    before: float,
+    rules: BehaviorReader, behavior: Behavior, given: Bindings, places: Sequence[tuple[Step, State]], before: float
 ) -> Contrast:
-    """Return the position at which the fewest conditions of a behaviour fail, and these conditions."""
+    """Return the place at which the fewest conditions of a behaviour fail, and these conditions."""
     found = []
-    for step, facts in places:
-        bindings, lacks = failing_conditions(rules, behavior.preconditions, given, behavior.kinds, (facts,))
+    for step, state in places:
+        facts = (LoggedState(rules.problem, state),)
+        bindings, lacks = failing_conditions(rules, behavior.preconditions, given, behavior.kinds, facts)
         arguments = tuple(bindings.get(p.name, p.name) for p in behavior.parameters)
         found.append(Contrast(before, behavior.name, arguments, step, lacks))
     return min(found, key=lambda one: len(one.lacks))

@@ -35,18 +35,11 @@ def numbers(places: Iterable[StepPosition]) -> dict[Path, str]:
 
 
 def find(places: Sequence[StepPosition], asked: int | str | Sequence[int | str], hint: str = "") -> Path:
-    """Return the path of the step that the argument `asked` names.
+    """Return the path of the step that the argument `asked` names; `places` has steps before their sub-steps.
 
-    Parameters
-    ----------
-    places : sequence of StepPosition
-        The places of all steps of a plan; the place of a step comes before the places of its sub-steps.
-    asked : int, str or path
-        The step in one of these notations: the number of a step of the first level, counted from 0, or from the end if it is
-        negative; ``L3#12`` for step 12 of
-        level 3, counted from 0; a path like ``0.1.2``; or words of the step, also as a tuple.
-    hint : str
-        The last part of the error message if no step is similar to `asked`.
+    `asked` is the number of a step of the first level, counted from 0, or from the end if it is negative; ``L3#12`` for step 12 of
+    level 3, counted from 0; a path like ``0.1.2``; or words of the step, also as a tuple. The error message ends with `hint` if no
+    step is similar.
 
     Raises
     ------

@@ -41,29 +41,17 @@ PRECISION = 1_000_000
 def preferred(
     problem: Problem, search: PlanSearch, prove: PlanSearch | None = None, finish: PlanSearch | None = None
 ) -> tuple[Problem, Outcome]:
-    """Choose among the soft goals of a task.
+    """Choose among the soft goals of a task; return the task without the unmet soft goals, and the outcome of planning for it.
 
     Parameters
     ----------
     problem : Problem
         A problem whose soft goals have weights.
-    search : callable
-        Function that plans for the goals of a problem.
-    prove : callable, optional
-        Function that plans for the goals of a problem and proves a lower bound on the cost of a plan. With this function,
-        `preferred` tries all choices that could be cheaper, at most `MOST_CHOICES`.
-    finish : callable, optional
-        Function that plans for the goals of a problem with more work than `search`. With this function, `search` compares the
-        choices, and `finish` plans for the chosen soft goals.
-
-    Returns
-    -------
-    Problem
-        The task without the unmet soft goals.
-    Outcome
-        The result of planning for the returned task; `forgone` contains the unmet soft goals. With `prove`, `bound` is a lower
-        bound on the total cost of any choice, reduced by the weights of the unmet soft goals. It is negative if a choice with a
-        smaller total cost than these weights isn't excluded.
+    search, prove, finish : callable
+        Functions that plan for the goals of a problem. `prove` also proves a lower bound on the cost; with `prove`, all choices are
+        tried that could be cheaper, at most `MOST_CHOICES`, and `bound` of the outcome is a lower bound on the total cost of any
+        choice, reduced by the weights of the unmet soft goals. It is negative if a choice with a smaller total cost than these
+        weights isn't excluded. With `finish`, which does more work than `search`, `search` only compares the choices.
     """
     if not problem.weights:
         return problem, (prove or search)(problem)

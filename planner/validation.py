@@ -83,16 +83,9 @@ def carried_out(
     symbols that the step's level sees must have the values that the step states. Other changed symbols must be at rest. The goal
     must hold after the last step. The checker stops at an inapplicable step.
 
-    Parameters
-    ----------
-    problem : Problem
-    plan : Plan
-    lookups : dict, optional
-        Dictionary to which the checker adds the individuals on which the check depends. If the problem has all of these
-        individuals, every larger problem of the same scene has the same faults.
-    lifted : mapping of name to behaviour, optional
-        The behaviours in their original form, in which an effect may apply to every member of a class. The individuals that such an
-        effect can change are also recorded in `lookups`.
+    The checker adds the individuals on which the check depends to `lookups`: if the problem has all of these individuals, every
+    larger problem of the same scene has the same faults. `lifted` has the behaviours in their original form, in which an effect may
+    apply to every member of a class; the individuals that such an effect can change are also recorded in `lookups`.
     """
     rules = BehaviorReader(problem, lookups, lifted)
     check = _PlanExecution(problem, max((step.level for step in plan.walk()), default=0), rules)

@@ -82,18 +82,10 @@ def refuted_by(
 ) -> tuple[Refutation, ...]:
     """Return refutations after a failed primitive: the primitive and some of its ancestors are impossible while `facts` hold.
 
-    Parameters
-    ----------
-    problem : Problem
-    chain : sequence of Step
-        The primitive, preceded by its ancestors.
-    facts : sequence of Fact
-        The places of all participating objects; empty if unknown. A behaviour of an upper level is refuted only if the level
-        sees all facts in `facts`.
-    why : str
-    likewise : sequence of Refutation
-        Refutations of similar primitives for the same reason, for example with another hand. An ancestor is refuted if no other
-        behaviour has its effects. Refutations that `likewise` implies are left out.
+    `chain` is the primitive, preceded by its ancestors. `facts` are the places of all participating objects, or empty if unknown. A
+    behaviour of an upper level is refuted only if the level sees all `facts`. `likewise` are refutations of similar primitives for
+    the same reason, for example with another hand; an ancestor is also refuted if no other behaviour has its effects. Refutations
+    that `likewise` implies are left out.
     """
     exact, found = Refutation(chain[-1].behavior, chain[-1].arguments, tuple(facts), why), list[Refutation]()
     steps = chain if facts and not any(one.covers(exact) for one in likewise) else ()

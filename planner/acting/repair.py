@@ -81,16 +81,11 @@ def repair_or_replan(
         The remaining steps; if the first step is partly done, `rest` contains only the remaining sub-steps of this step.
     planned : Problem
         The problem for which `rest` was planned: the expected situation, and the goal.
-    planner : callable, optional
-        Function that makes a new plan from a situation in which all hands are at rest; if left out, the default planner.
-    using : Compiled, optional
-        The result of `confab.planner.hierarchical.planner.compiled` for the same domain, individuals and static facts.
-    in_progress : bool
-        Whether the first step of `rest` may be finished as planned.
-    limits : Limits
-        Limits of the whole call, whether it repairs, replans, or does both.
-    begun : bool
-        Whether the first step of `rest` has begun; if so, the step is finished even if its own precondition no longer holds.
+    planner, using, limits
+        As for `replan`; the limits are those of the whole call.
+    in_progress, begun : bool
+        Whether the first step of `rest` may be finished as planned, and whether it has begun. A step that has begun is finished
+        even if its own precondition no longer holds.
     """
     using, end = using or compiled(problem), limits.end()
     repaired = repair(problem, rest, planned, using, in_progress, limits, begun)
@@ -168,7 +163,10 @@ def changed_individuals(planned: Problem, now: Problem) -> set[str]:
 def replan(
     problem: Problem, planner: Planner | None, using: Compiled, limits: Limits
 ) -> tuple[tuple[Step, ...] | None, Outcome]:
-    """Return a new plan: first the hands are brought to rest, then the task is planned."""
+    """Return a new plan: first the hands are brought to rest, then `planner` (or the default planner) plans the task.
+
+    `using` is the result of `confab.planner.hierarchical.planner.compiled` for the same domain, individuals and static facts.
+    """
     first: tuple[Step, ...] = ()
     now, end = problem, limits.end()
     call = Call(problem, using, end, limits.expansions)

@@ -85,17 +85,10 @@ def live(
     failed: tuple[int, ...] | None = None,
     failures: Iterable[tuple[Problem, Step, Sequence[int]]] = (),
 ) -> None:
-    """Learn from the executed plans of one episode.
+    """Learn from the executed plans of one episode, each with a problem whose initial state is the state before the plan.
 
-    Parameters
-    ----------
-    experience : Experience
-    parts : iterable of (problem, plan)
-        Executed plans, each with a problem whose initial state is the state before the plan.
-    failed : path of a step, optional
-        The step of the plan that failed; later steps weren't tried.
-    failures : iterable of (problem, step, path)
-        Other steps of the most abstract level that failed, each with its problem, and the path of its failed sub-step.
+    `failed` is the path of the step of the plan that failed, before later steps were tried. `failures` are other steps of the most
+    abstract level that failed, each with its problem, and the path of its failed sub-step.
 
     Raises
     ------
