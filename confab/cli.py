@@ -57,9 +57,12 @@ class Commands(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return the command with a name; for an unknown name, the error suggests the most similar name."""
         if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+            from confab.commands.misplaced import known_as
             from confab.guessing import command
             from confab.reasoner.names import nearest
 
+            if said := known_as(args[:1], ctx):
+                raise click.UsageError(said, ctx)
             meant = command(args[0], COMMANDS)
             hint = f"; did you mean '{meant}'?" if meant else nearest(args[0], [*COMMANDS, "help"])
             raise click.UsageError(f"no such command '{args[0]}'{hint}", ctx)

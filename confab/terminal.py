@@ -262,7 +262,7 @@ def _in_place_of(option: str, context: click.Context) -> str:
     plain = option.lstrip("-").replace("-", "_").lower()
     for each in context.command.params:
         if isinstance(each, click.Argument) and plain in (each.name, *(each.metavar or "").lower().split(".")):
-            return f"; give {each.metavar} without the name of an option"
+            return f"; give {(each.metavar or '').strip('[]')} without the name of an option"
     if meant := chosen(option, names(context.command)):
         return f"; did you mean '{meant}'?"
     if why := needless(option):

@@ -11,11 +11,25 @@ import click
 from click.exceptions import Exit
 
 from confab.commands.given import load_scene
-from confab.commands.options import AS_JSON, PATH, QUERY_ROWS, QUERY_SECONDS, QUIET, SCENE, SCENE_IRI, Output, command
+from confab.commands.misplaced import QUERY as A_QUERY
+from confab.commands.options import (
+    AS_JSON,
+    PATH,
+    QUERY_ROWS,
+    QUERY_SECONDS,
+    QUIET,
+    SCENE,
+    SCENE_IRI,
+    Input,
+    Output,
+    Text,
+    command,
+)
 from confab.examples import examples
 from confab.progress import progress
 from confab.reasoner.files import STDOUT
 from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.kinds import EPISODE
 from confab.terminal import NO, YES, limited, show_result, told
 
 if TYPE_CHECKING:
@@ -69,11 +83,14 @@ FORMS = {
 @SCENE
 @click.argument(
     "sparql",
+    type=Text(A_QUERY),
     required=False,
     metavar="[QUERY]",
     help="SPARQL text, a .rq file, a shipped query (where-was-it), or - for stdin.",
 )
-@click.option("--episodes", multiple=True, type=PATH, metavar="FILE", help="Also query this saved episode; repeatable.")
+@click.option(
+    "--episodes", multiple=True, type=Input(EPISODE), metavar="FILE", help="Also query this saved episode; repeatable."
+)
 @click.option("--show", metavar="BEHAVIOR", help="Print the query that quantifies this behaviour.")
 @click.option(
     "--applicable", is_flag=True, help="With --show: the query for the arguments with which it is applicable."

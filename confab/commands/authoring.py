@@ -10,10 +10,25 @@ from typing import TYPE_CHECKING
 import click
 from click.exceptions import Exit
 
-from confab.commands.options import AS_JSON, GOALS, PATH, QUIET, SCENE, SEED, TIME_LIMIT, Output, command, scene_names
+from confab.commands.misplaced import PDDL
+from confab.commands.misplaced import SCENE as A_SCENE
+from confab.commands.options import (
+    AS_JSON,
+    GOALS,
+    PATH,
+    QUIET,
+    SCENE,
+    SEED,
+    TIME_LIMIT,
+    Input,
+    Output,
+    Text,
+    command,
+    scene_names,
+)
 from confab.examples import examples
 from confab.progress import progress
-from confab.reasoner.kinds import CONVERTED, GENERATED, IMPORTED, PICTURE, TRAJECTORIES
+from confab.reasoner.kinds import CONVERTED, GENERATED, IMPORTED, PICTURE, PLAN, TRAJECTORIES
 from confab.terminal import EXIT, NO, YES, limited, remark, show_result, told
 
 if TYPE_CHECKING:
@@ -80,6 +95,7 @@ def picture(scene: str, out: Path, behavior: str | None, classes: bool) -> None:
 @command(epilog=examples("validate"))
 @click.argument(
     "files",
+    type=Text(A_SCENE),
     nargs=-1,
     required=True,
     metavar="FILE…",
@@ -145,7 +161,7 @@ def generate(family: str, out: Path, objects: int, hands: int, clutter: int, see
 
 
 @command(epilog=examples("convert"))
-@click.argument("file", type=PATH, metavar="FILE.ttl")
+@click.argument("file", type=Input(A_SCENE), metavar="FILE.ttl")
 @click.option(
     "--behaviors",
     "form",
@@ -180,8 +196,8 @@ def convert(file: Path, form: str, out: Path | None) -> None:
 
 
 @command("import", epilog=examples("import"))
-@click.argument("source", metavar="DOMAIN.pddl|WORLD.yaml")
-@click.argument("problem", type=PATH, required=False, metavar="[PROBLEM.pddl]")
+@click.argument("source", type=Text(PDDL), metavar="DOMAIN.pddl|WORLD.yaml")
+@click.argument("problem", type=Input(PDDL), required=False, metavar="[PROBLEM.pddl]")
 @click.option("-o", "--output", "out", type=Output(IMPORTED), required=True, metavar="SCENE.ttl", help="File to write.")
 @click.option(
     "--level",
@@ -231,7 +247,10 @@ def import_(
 )
 @click.option("--bt", "trees", is_flag=True, help="Export a plan as a behaviour tree (BehaviorTree.CPP 4, py_trees).")
 @click.option(
-    "--plan", type=PATH, metavar="PLAN.json", help="Plan for the trajectories or the tree; by default a new plan."
+    "--plan",
+    type=Input(PLAN),
+    metavar="PLAN.json",
+    help="Plan for the trajectories or the tree; by default a new plan.",
 )
 @click.option("--both-hands", is_flag=True, help="Execute with all hands at once.")
 @GOALS

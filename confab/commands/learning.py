@@ -9,10 +9,12 @@ import click
 from click.exceptions import Exit
 
 from confab.commands.given import load_scene
-from confab.commands.options import AS_JSON, PATH, QUIET, TIME_LIMIT, Command, Output, command, scene_names
+from confab.commands.misplaced import SCENE as A_SCENE
+from confab.commands.misplaced import kind_of_value, known_as
+from confab.commands.options import AS_JSON, QUIET, TIME_LIMIT, Command, Input, Output, Text, command, scene_names
 from confab.examples import examples
 from confab.progress import progress
-from confab.reasoner.kinds import MEMORY, PICTURE
+from confab.reasoner.kinds import EPISODE, MEMORY, PICTURE, PLAN
 from confab.terminal import EXIT, NO, YES, limited, remark, show_result
 
 if TYPE_CHECKING:
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
 @command(epilog=examples("learn"))
 @click.argument(
     "scenes",
+    type=Text(A_SCENE),
     nargs=-1,
     required=True,
     metavar="SCENE…",
@@ -29,13 +32,20 @@ if TYPE_CHECKING:
     help="Scenes to plan in and learn from.",
 )
 @click.option(
-    "--memory", type=Output(MEMORY), required=True, metavar="FILE", help="Memory file to update; created if missing."
+    "--memory",
+    "-o",
+    "--output",
+    "memory",
+    type=Output(MEMORY),
+    required=True,
+    metavar="FILE",
+    help="Memory file to update; created if missing.",
 )
-@click.option("--plan", "demonstration", type=PATH, metavar="PLAN.json", help="Learn from this plan only.")
+@click.option("--plan", "demonstration", type=Input(PLAN), metavar="PLAN.json", help="Learn from this plan only.")
 @click.option(
     "--episode",
     "lived",
-    type=PATH,
+    type=Input(EPISODE),
     multiple=True,
     metavar="EPISODE.json",
     help="Learn from this output of 'confab execute --json' only; repeatable.",
@@ -116,6 +126,20 @@ class InOrder(click.Group):
         """Return the names of the commands."""
         return list(self.commands)
 
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the command with a name; a memory file in place of a command is shown."""
+        if args and args[0] not in self.commands:
+            if kind_of_value(args[0]) == MEMORY:
+                return super().resolve_command(ctx, ["show", *args])
+            root = ctx.find_root().command
+            known = isinstance(root, click.Group) and args[0] in root.list_commands(ctx)
+            more = f"confab {args[0]} is a command" if known else known_as(args[:1], ctx)
+            said = f"no such command 'memory {args[0]}'; wanted {', '.join(self.commands)}"
+            raise click.UsageError("; ".join(filter(None, (said, more))), ctx)
+        return super().resolve_command(ctx, args)
+
 
 @click.group("memory", cls=InOrder)
 def memory_app() -> None:
@@ -133,7 +157,7 @@ def migrate(memory: Path, renames: tuple[str, ...]) -> None:
 
 
 @memory_app.command(epilog=examples("memory show"))
-@click.argument("memory", metavar="FILE_OR_URL", help="Memory file, or SPARQL endpoint.")
+@click.argument("memory", type=Text(MEMORY), metavar="FILE_OR_URL", help="Memory file, or SPARQL endpoint.")
 @click.option("--most", type=click.IntRange(min=1), default=30, metavar="N", help="Maximum number of rows.")
 @AS_JSON
 def show(memory: str, most: int, as_json: bool) -> None:
@@ -154,7 +178,9 @@ def show(memory: str, most: int, as_json: bool) -> None:
 
 
 @memory_app.command(epilog=examples("memory merge"))
-@click.argument("memories", nargs=-1, required=True, metavar="FILE_OR_URL…", help="Memories to merge.")
+@click.argument(
+    "memories", type=Text(MEMORY), nargs=-1, required=True, metavar="FILE_OR_URL…", help="Memories to merge."
+)
 @click.option(
     "-o",
     "--output",

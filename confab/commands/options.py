@@ -12,8 +12,11 @@ from typing import Any
 import click
 
 from confab import ontology
+from confab.commands.misplaced import FACT, IRI, correction, kind_of_value, taken
+from confab.commands.misplaced import SCENE as A_SCENE
 from confab.reasoner.files import STDOUT
-from confab.reasoner.kinds import CONVERTED, EPISODE, GENERATED, IMPORTED, PLAN, VERDICTS
+from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.kinds import CONVERTED, EPISODE, GENERATED, IMPORTED, MEMORY, PLAN, VERDICTS
 
 TEXTS = ("", PLAN, VERDICTS, EPISODE, GENERATED, IMPORTED, CONVERTED)
 """Kinds of content that a command can write to standard output. The empty text is the kind of query results."""
@@ -21,11 +24,19 @@ TEXTS = ("", PLAN, VERDICTS, EPISODE, GENERATED, IMPORTED, CONVERTED)
 STDIN = Path("/dev/stdin")
 
 
-class Input(click.Path):
-    """A file that a command reads, or ``-`` for standard input."""
+class Text(click.types.StringParamType):
+    """A text of a kind of `confab.commands.misplaced`, for example a goal, or the name of a scene."""
 
-    def __init__(self) -> None:
+    def __init__(self, kind: str) -> None:
+        self.kind = kind
+
+
+class Input(click.Path):
+    """A file that a command reads, or ``-`` for standard input; `kind` is the kind of the file, empty for any kind."""
+
+    def __init__(self, kind: str = "") -> None:
         super().__init__(path_type=Path)
+        self.kind = kind
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the path."""
@@ -73,10 +84,16 @@ class Command(click.Command):
 
         Errors of the parser get the command as context, so that their messages can refer to the command's help.
         """
+        ctx.meta[GIVEN] = [*args]
         try:
             return super().parse_args(ctx, args)
         except click.UsageError as error:
             error.ctx = error.ctx or ctx
+            missing = isinstance(error, click.MissingParameter)
+            if type(error) is click.UsageError or missing:
+                right = correction(ctx, ctx.meta[GIVEN], missing)
+                said = [error.format_message().rstrip(".")] if missing or not right else []
+                raise click.UsageError("; ".join([*said, *([right] if right else [])]), ctx) from error
             raise
 
     def invoke(self, ctx: click.Context) -> Any:
@@ -98,7 +115,25 @@ class Command(click.Command):
                         f"one file for two purposes: {path} is both {_name(other)} and {_name(output)}; give another name",
                         ctx,
                     )
-        return super().invoke(ctx)
+        try:
+            if any(_is_no_scene(each, ctx.params.get(each.name or "")) for each in self.params):
+                raise KnowledgeError("wanted a scene")
+            return super().invoke(ctx)
+        except KnowledgeError as error:
+            if right := correction(ctx, ctx.meta[GIVEN]):
+                raise KnowledgeError(right) from error
+            raise
+
+
+GIVEN = "confab.given"
+"""The index of the words of the command line in `click.Context.meta`."""
+
+
+def _is_no_scene(parameter: click.Parameter, given: object) -> bool:
+    """Return whether a scene is wanted and a file of Confab with another kind of content is given."""
+    values = given if isinstance(given, tuple) else (given,)
+    named = [value for value in values if isinstance(value, str) and value.endswith(".json")]
+    return taken(parameter) == A_SCENE and any(kind_of_value(value) not in ("", A_SCENE) for value in named)
 
 
 def _reads_stdin(given: object, parameter: click.Parameter) -> bool:
@@ -165,19 +200,23 @@ def QUIET(function: Any) -> Any:  # noqa: N802 - it is used like the constants t
 
 SCENE = click.argument(
     "scene",
+    type=Text(A_SCENE),
     metavar="SCENE",
     shell_complete=scene_names,
     help="Shipped name, file, URL of a SPARQL endpoint, or - for stdin.",
 )
-SCENE_IRI = click.option("--scene", "iri", metavar="IRI", help="IRI of the scene at an endpoint with several scenes.")
+SCENE_IRI = click.option(
+    "--scene", "iri", type=Text(IRI), metavar="IRI", help="IRI of the scene at an endpoint with several scenes."
+)
 GOALS = click.option(
     "--goal",
+    type=Text(FACT),
     multiple=True,
     metavar="FACT",
     help="A goal that replaces the goal of its symbol, e.g. 'cup2 LOCATION location8'; repeatable.",
 )
 MEMORY_FILE = click.option(
-    "--memory", type=PATH, metavar="FILE", help="Memory file; no other memory is read or written."
+    "--memory", type=Input(MEMORY), metavar="FILE", help="Memory file; no other memory is read or written."
 )
 NO_MEMORY = click.option("--no-memory", is_flag=True, help="Plan explicitly without memory.")
 MODE = click.option(

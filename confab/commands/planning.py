@@ -11,6 +11,8 @@ import click
 from click.exceptions import Exit
 
 from confab.commands.given import blame_reach, json_file, load_scene, memory_for, plan_in, warn_of_errors
+from confab.commands.misplaced import FACT, INTERVENTION
+from confab.commands.misplaced import SCENE as A_SCENE
 from confab.commands.options import (
     AS_JSON,
     GOALS,
@@ -26,7 +28,9 @@ from confab.commands.options import (
     SCENE_IRI,
     SEED,
     TIME_LIMIT,
+    Input,
     Output,
+    Text,
     command,
     scene_names,
 )
@@ -35,7 +39,7 @@ from confab.planner.solve import DEFAULT_MODE, Mode
 from confab.progress import progress
 from confab.reasoner.files import check_folder
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.kinds import EPISODE, FILM, MEMORY, PICTURE, PLAN, REPORT, VERDICTS
+from confab.reasoner.kinds import EPISODE, FILM, MEMORY, OBSERVED, PICTURE, PLAN, REPORT, VERDICTS
 from confab.terminal import EXIT, GAVE_UP, NO, YES, limited, remark, show_result, told
 
 if TYPE_CHECKING:
@@ -61,7 +65,7 @@ if TYPE_CHECKING:
 @click.option(
     "--from-observed",
     "observed",
-    type=PATH,
+    type=Input(OBSERVED),
     metavar="FILE",
     help="File of observed facts, which replace the scene's facts.",
 )
@@ -139,6 +143,7 @@ def plan(
 @command(epilog=examples("run"))
 @click.argument(
     "scene",
+    type=Text(A_SCENE),
     required=False,
     default="beverage-serving",
     metavar="[SCENE]",
@@ -184,7 +189,13 @@ def run(
 
 @command(epilog=examples("verify"))
 @SCENE
-@click.argument("plan", type=PATH, metavar="PLAN.json", help="Output of 'confab plan --json', or a plan in PDDL.")
+@click.argument(
+    "plan",
+    type=Input(PLAN),
+    required=False,
+    metavar="[PLAN.json]",
+    help="Output of 'confab plan --json', or a plan in PDDL; by default a new plan.",
+)
 @click.option(
     "--rollouts", type=click.IntRange(min=1), default=1, metavar="N", help="Number of rollouts, with seeds S, S+1, …"
 )
@@ -207,7 +218,7 @@ def run(
 @QUIET
 def verify(
     scene: str,
-    plan: Path,
+    plan: Path | None,
     rollouts: int,
     seed: int,
     noise: float,
@@ -229,7 +240,7 @@ def verify(
     with limited(time_limit), counted(rollouts) as done:
         loaded = load_scene(scene)
         report = loaded.verify(
-            plan_in(plan, loaded),
+            None if plan is None else plan_in(plan, loaded),
             rollouts,
             seed,
             perturb=perturb,
@@ -264,11 +275,12 @@ def verify(
 @click.option("--on", metavar="INTERFACE:ADDRESS", help="Robot to act on, e.g. pyrobosim:world.yaml; excludes --world.")
 @click.option(
     "--intervene",
+    type=Text(INTERVENTION),
     multiple=True,
     metavar="'WHEN WHAT'",
     help="e.g. 'after=28 cup2 LOCATION location8', or a file of interventions.",
 )
-@click.option("--plan", type=PATH, metavar="PLAN.json", help="Plan to begin with.")
+@click.option("--plan", type=Input(PLAN), metavar="PLAN.json", help="Plan to begin with.")
 @GOALS
 @MEMORY_FILE
 @NO_MEMORY
@@ -383,10 +395,11 @@ def execute(
 @click.option(
     "--not",
     "instead",
+    type=Text(FACT),
     metavar="WHAT",
     help="The alternative: 'cup2 LOCATION location8 by left_hand', 'B2_PICK right_hand cup1'.",
 )
-@click.option("--plan", type=PATH, metavar="PLAN.json", help="Plan to explain, instead of a new one.")
+@click.option("--plan", type=Input(PLAN), metavar="PLAN.json", help="Plan to explain, instead of a new one.")
 @GOALS
 @MEMORY_FILE
 @MODE

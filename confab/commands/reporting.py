@@ -8,11 +8,11 @@ from shlex import quote
 import click
 
 from confab.commands.given import load_scene, plan_in
-from confab.commands.options import AS_JSON, FOLDER, GOALS, PATH, QUIET, SCENE, TIME_LIMIT, Output, command
+from confab.commands.options import AS_JSON, FOLDER, GOALS, QUIET, SCENE, TIME_LIMIT, Input, Output, command
 from confab.examples import examples
 from confab.progress import progress
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.kinds import REPORT
+from confab.reasoner.kinds import EPISODE, PLAN, REPORT, VERDICTS
 from confab.terminal import limited, show_result, told
 
 
@@ -20,11 +20,16 @@ from confab.terminal import limited, show_result, told
 @SCENE
 @click.option("-o", "--output", "out", type=Output(REPORT), required=True, metavar="FILE.html", help="File to write.")
 @GOALS
-@click.option("--plan", type=PATH, metavar="PLAN.json", help="With --verdicts: the plan that was verified.")
+@click.option("--plan", type=Input(PLAN), metavar="PLAN.json", help="Show this plan, or the plan of --verdicts.")
 @click.option(
-    "--verdicts", type=PATH, metavar="VERDICTS.json", help="Show the verdicts in a file of 'confab verify -o'."
+    "--verdicts",
+    type=Input(VERDICTS),
+    metavar="VERDICTS.json",
+    help="Show the verdicts in a file of 'confab verify -o'.",
 )
-@click.option("--episode", type=PATH, metavar="EPISODE.json", help="Show the episode in a file of 'confab execute -o'.")
+@click.option(
+    "--episode", type=Input(EPISODE), metavar="EPISODE.json", help="Show the episode in a file of 'confab execute -o'."
+)
 @TIME_LIMIT
 @QUIET
 def report(
@@ -40,8 +45,8 @@ def report(
     from confab.page.data import page_data
     from confab.page.frozen import write_page
 
-    if (plan is None) != (verdicts is None):
-        raise KnowledgeError("--plan and --verdicts belong together; give both, or none")
+    if plan is None and verdicts is not None:
+        raise KnowledgeError("--verdicts belong to a plan; also give --plan PLAN.json")
     if episode is not None and (goal or plan is not None):
         raise KnowledgeError("--episode shows an execution alone; leave out --goal, --plan and --verdicts")
     with limited(time_limit):
@@ -51,6 +56,8 @@ def report(
         elif plan is not None and verdicts is not None:
             data = page_data(loaded, report=loaded.read_report(verdicts, plan_in(plan, loaded)))
             data["again"] = data["again"].replace("PLAN.json", quote(str(plan)))
+        elif plan is not None:
+            data = page_data(loaded, loaded.read_result(plan_in(plan, loaded), goal))
         else:
             with progress("planning"):
                 data = page_data(loaded, loaded.plan(goal))
