@@ -37,12 +37,7 @@ WAYS: Mapping[str, Mapping[str, str]] = {
     "plan": {"result": "result"},
     "step": {"scene.behaviors[step.behavior]": "behaviour"},
     "execution": {"episode": "episode", "plan": "plan"},
-    "episode": {"execution": "execution"},
-    "report": {"shown": "rollout"},
-    "rollout": {"failure.verdict": "verdict"},
-    "entry": {"verdict": "verdict"},
     "problem": {"domain": "domain"},
-    "fact": {"symbol": "symbol"},
 }
 """The expressions for other objects to which an object leads, each with the kind of the other object."""
 COMMON = {"copy.deepcopy({})": "deepcopy", "print({})": "print", "{} == other": "=="}
@@ -102,9 +97,10 @@ def words_of(name: str, kind: str = "") -> frozenset[str]:
     """Return the stems of the significant words of a name, for example of ``plan`` and ``length`` for ``getPlanLength``."""
     words = [word for run in re.findall(r"[^\W_]+", parted(name)) for word in segments(run) or (run,)]
     aside = {*map(stem, (kind, *ASIDE.get(kind, ())))}
-    return frozenset(stem(word) for word in words if word not in FILLERS and stem(word) not in aside) or frozenset(
-        map(stem, words)
+    telling = frozenset(
+        stem(word) for word in words if word not in FILLERS and stem(word) not in aside and len(word) > 1
     )
+    return telling or frozenset(map(stem, words))
 
 
 @cache
@@ -157,17 +153,23 @@ def known(kind: str) -> Mapping[str | frozenset[str], str]:
     return indexed(listed(kind), kind)
 
 
+def elsewhere(kind: str, name: str | frozenset[str]) -> str:
+    """Return the expression to use for a name, or for its words, of an object to which an object leads; empty if there is none."""
+    for way, other in WAYS.get(kind, {}).items():
+        if right := known(other).get(name):
+            return right.removeprefix("scene." * (kind == "scene")) if WHOLE.match(right) else f"{way}.{right}"
+    return ""
+
+
 def certain(kind: str, name: str) -> str:
     """Return the expression to use for a name that the tables know; return an empty text for any other name.
 
     >>> certain("result", "elapsed"), certain("plan", "iterrows"), certain("result", "iloc"), certain("plan", "xyzzy")
     ('seconds', 'to_dataframe().iterrows()', 'plan.to_dataframe().iloc', '')
     """
-    if right := known(kind).get(name) or known(kind).get(parted(name)) or known(kind).get(words_of(name, kind)):
+    own = known(kind).get(name) or known(kind).get(parted(name)) or known(kind).get(words_of(name, kind))
+    if right := own or elsewhere(kind, name) or elsewhere(kind, parted(name)):
         return right
-    for way, other in WAYS.get(kind, {}).items():
-        if right := known(other).get(name) or known(other).get(parted(name)):
-            return right.removeprefix("scene." * (kind == "scene")) if WHOLE.match(right) else f"{way}.{right}"
     for form, path in FORMS.get(kind, {}).items():
         home, _, cls = path.rpartition(".")
         try:
@@ -182,11 +184,15 @@ def certain(kind: str, name: str) -> str:
 def by_words(names: Iterable[tuple[str, str]], wanted: frozenset[str], kind: str = "") -> str:
     """Return the expression whose names have the greatest share of the wanted words; an empty text for less than `USUAL`.
 
+    Of expressions with equal shares, the first one of the overview is returned.
+
     >>> by_words(pairs({"with_fact": "add set", "with_goal": "add_goal goal"}), frozenset(["add", "goal"]))
     'with_goal'
     """
-    bags = dict[str, dict[str, float]]()
+    bags, order = dict[str, dict[str, float]](), dict[str, int]()
     for name, right in names:
+        if name == last_name(right):
+            order[right] = -len(order)
         words, bag = words_of(name, kind), bags.setdefault(right, {})
         share = (1.0 if words <= wanted else PART) + OWN * (name == last_name(right))
         bag.update({word: max(share, bag.get(word, 0.0)) for word in words & wanted})
@@ -198,7 +204,7 @@ def by_words(names: Iterable[tuple[str, str]], wanted: frozenset[str], kind: str
         * (1.0 if max(bag.values(), default=0.0) >= 1.0 else HALF)
         for right, bag in bags.items()
     }
-    best = max(worth, key=lambda right: worth[right], default="")
+    best = max(worth, key=lambda right: (round(worth[right], 6), order.get(right, -len(order))), default="")
     return best if best and worth[best] >= USUAL * sum(weights.values()) else ""
 
 
@@ -225,7 +231,8 @@ def hint(kind: str, name: str, names: Collection[str] = ()) -> str:
         return f"; use {expanded(short, right)}"
     if near := misspelt(name, names):
         return f"; did you mean '{near}'?"
-    perhaps = by_words(listed(short), words_of(name, short), short)
+    wanted = words_of(name, short)
+    perhaps = by_words(listed(short), wanted, short) or elsewhere(short, wanted)
     return f"{f'; perhaps {expanded(short, perhaps)}' if perhaps else ''}{overview(kind, names)}"
 
 
@@ -255,6 +262,8 @@ def chosen(name: str, names: Iterable[str]) -> str:
     """
     plain = {each.lstrip("-").replace("-", "_"): each for each in names}
     asked = name.lstrip("-").replace("-", "_").lower()
+    if near := misspelt(asked, plain):
+        return plain[near]
     rows = {there[0]: "" for rights in OPTIONS if (there := [right for right in rights.split() if right in plain])}
     for rights, others in OPTIONS.items():
         there = [right for right in rights.split() if right in plain]
@@ -262,8 +271,6 @@ def chosen(name: str, names: Iterable[str]) -> str:
             return plain[there[0]]
         if there:
             rows[there[0]] += f" {rights} {others}"
-    if misspelt(asked, plain):
-        return ""
     meant = by_words([*pairs(rows), *((each, each) for each in plain)], words_of(asked))
     return plain.get(meant, "")
 

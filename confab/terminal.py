@@ -261,8 +261,11 @@ def _in_place_of(option: str, context: click.Context) -> str:
 
     plain = option.lstrip("-").replace("-", "_").lower()
     for each in context.command.params:
-        if isinstance(each, click.Argument) and plain in (each.name, *(each.metavar or "").lower().split(".")):
-            return f"; give {(each.metavar or '').strip('[]')} without the name of an option"
+        if isinstance(each, click.Argument) and plain in (
+            each.name,
+            *re.split(r"[.…\[\]]", (each.metavar or "").lower()),
+        ):
+            return f"; give {(each.metavar or '').strip('[]…')} without the name of an option"
     if meant := chosen(option, names(context.command)):
         return f"; did you mean '{meant}'?"
     if why := needless(option):
@@ -273,6 +276,8 @@ def _in_place_of(option: str, context: click.Context) -> str:
     group = context.find_root().command
     if not isinstance(group, click.Group):
         return ""
+    if plain in group.list_commands(context):
+        return f"; confab {plain} is a command"
     commands = {name: names(group.get_command(context, name)) for name in group.list_commands(context)}
     others = [name for name, known in commands.items() if option in known]
     return f"; it is an option of {', '.join(others)}" if others else ""

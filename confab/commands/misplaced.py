@@ -171,14 +171,15 @@ def known_as(values: Sequence[str], context: click.Context) -> str:
     return f"{said}; use: {' | '.join(calls[:MOST])}" if calls else ""
 
 
-def correction(context: click.Context, words: Sequence[str], missing: bool = False) -> str:
+def correction(context: click.Context, words: Sequence[str], missing: bool = False, known: bool = False) -> str:
     """Return the correct call for given words, or calls of other commands for values that the command doesn't take.
 
-    The text is empty if no value is at a wrong place; if a value is missing, the call with a placeholder is returned.
+    The text is empty if no value is at a wrong place; if a value is missing, the call with a placeholder is returned. If `known`,
+    only values of a known kind count.
     """
     placed, moved, left = rearranged(context.command, words)
     if left:
         return known_as(left, context)
     kinds = [f"{quote(value)} is {kind_of_value(value)}" for value in moved if kind_of_value(value) not in ("", NUMBER)]
     call = line(context.command_path, context.command, context, placed)
-    return "; ".join([*kinds[:1], f"use: {call}"]) if moved or missing else ""
+    return "; ".join([*kinds[:1], f"use: {call}"]) if kinds or (moved and not known) or missing else ""

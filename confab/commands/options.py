@@ -120,13 +120,16 @@ class Command(click.Command):
                 raise KnowledgeError("wanted a scene")
             return super().invoke(ctx)
         except KnowledgeError as error:
-            if right := correction(ctx, ctx.meta[GIVEN]):
-                raise KnowledgeError(right) from error
+            if right := correction(ctx, ctx.meta[GIVEN], known=True):
+                said = f"{error}; " * (len(str(error)) <= SHORT)
+                raise KnowledgeError(said + right) from error
             raise
 
 
 GIVEN = "confab.given"
 """The index of the words of the command line in `click.Context.meta`."""
+SHORT = 80
+"""Maximum length of an error about a value that precedes the correct command line; longer ones are left out."""
 
 
 def _is_no_scene(parameter: click.Parameter, given: object) -> bool:

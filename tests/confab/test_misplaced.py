@@ -78,6 +78,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ([SCENE], f"{SCENE} is a scene; use: confab plan {SCENE} | confab run {SCENE} | confab verify {SCENE}"),
         (["memory.ttl"], "memory.ttl is a memory; use: confab memory show memory.ttl | "),
         (["scenes", SCENE], f"use: confab plan {SCENE} | "),
+        (["verify", SCENE, "missing.json"], "confab: missing.json: can't be read"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
