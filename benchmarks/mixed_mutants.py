@@ -32,7 +32,6 @@ from typing import Any, TypedDict
 
 from benchmarks.mutants import LIBRARIES, ROOT, Instead, faults, meaning
 from confab.planner.certificates import Certificate
-from confab.planner.certifying import KINDS
 from confab.reasoner.symbols import Problem
 from confab.scene import load
 from worlds import judging
@@ -341,7 +340,7 @@ def certificates_of(problem: Problem, judge: judging.Judge, rng: Random) -> Iter
         others = of_a_task_with_a_plan(problem, judge.meant, judge.reached, rng)
         yield from ((what, one, False) for what, one in (*lesser, *others))
         return
-    for kind in ("all", *KINDS):
+    for kind in ("all", *judging.KINDS):
         if (one := judging.certificate(kind, problem)) is not None:
             yield f"by {kind}", one, True
             if one.cases <= judging.FEW_CASES:

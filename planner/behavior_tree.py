@@ -163,7 +163,8 @@ class _TreeBuilder:
         if not step.steps:
             return First((self.kept(step.path), Do(step)))
         guard = All(tuple(self.kept(below.path) for below in self.needed(step)))
-        return First((guard, Subtree(f"{step} at {_dotted(step.path)}", All(self.in_order(step.steps)))))
+        name = f"{step} at {'.'.join(map(str, step.path))}"
+        return First((guard, Subtree(name, All(self.in_order(step.steps)))))
 
     def independent(self, one: Step, other: Step) -> bool:
         """Return whether no primitive of one step waits for a primitive of the other, and their workers differ."""
@@ -225,10 +226,6 @@ def _abstract_links(
 
 def _changes(purpose: Purpose, symbol: Symbol) -> bool:
     return any(change.fact.symbol == symbol for change in purpose.gives)
-
-
-def _dotted(path: Path) -> str:
-    return ".".join(map(str, path))
 
 
 # ------------------------------------------------------------------------------------------------------------- evaluation

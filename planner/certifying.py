@@ -64,9 +64,6 @@ ReachabilityQuestion: TypeAlias = "tuple[str, Symbol, str]"
 """Kinds of questions about reachability: can a symbol get a value (`GETS`), can a symbol lose its value (`LEAVES`), which amounts
 can a symbol get (`RANGE`), can a condition on the final state hold (`ENDS`)?"""
 GETS, LEAVES, RANGE, ENDS = "gets", "leaves", "range", "ends"
-KINDS = ("facts", "bounds", "pairs", "cases", "states")
-"""Kinds of certificates: unreachable facts; goals that exclude each other in every state; two goals that exclude each other;
-distinguished values; all values."""
 
 
 def certify(problem: Problem, most: float = WORK, few_states: bool = False) -> Certificate | None:
@@ -80,41 +77,18 @@ def certify(problem: Problem, most: float = WORK, few_states: bool = False) -> C
     try:
         relaxed = Relaxed(lowest)
         if few_states:
-            found = _with_little(lowest, most, partial(_by_states, lowest))
+            found = _with_little(lowest, most, partial(by_states, lowest))
             if found is not None:
                 return _with_fewer(lowest, found)
         return (
-            _in_every_state(lowest, _by_bounds)
+            _in_every_state(lowest, by_bounds)
             or _at_once(lowest, LITTLE[0])
-            or _in_every_state(lowest, _by_definitions)
+            or _in_every_state(lowest, by_definitions)
             or _contested(lowest)
             or _at_once(lowest, LITTLE[1])
             or relaxed.certificate(problem.goal)
             or _in_stages(lowest, relaxed)
         )
-    except (WorkLimitError, RecursionError):
-        return None
-
-
-def of_kind(kind: str, problem: Problem, most: float = WORK) -> Certificate | None:
-    """Return a certificate of one of the `KINDS`, found without the other kinds, or None.
-
-    In `certify`, a certificate of one kind can hide a fault in the search for another kind.
-    """
-    lowest = Lowest(problem, most)
-    relaxed = Relaxed(lowest)
-    try:
-        match kind:
-            case "facts":
-                return relaxed.certificate(problem.goal)
-            case "bounds":
-                return _by_bounds(lowest) or _by_definitions(lowest)
-            case "pairs":
-                return _by_pairs(lowest, relaxed)
-            case "cases":
-                return _by_cases(lowest, relaxed, problem.goal)
-            case _:
-                return _by_states(lowest)
     except (WorkLimitError, RecursionError):
         return None
 
@@ -335,9 +309,9 @@ def _in_stages(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
     """Return a certificate for two goals, for all goals, or of all states; the cheapest kind is tried first."""
     for little in (LITTLE[1], lowest.most):
         for find in (
-            partial(_by_pairs, lowest, relaxed),
-            partial(_by_cases, lowest, relaxed, lowest.problem.goal),
-            partial(_by_states, lowest),
+            partial(by_pairs, lowest, relaxed),
+            partial(by_cases, lowest, relaxed, lowest.problem.goal),
+            partial(by_states, lowest),
         ):
             if (found := _with_little(lowest, min(little, SHARE * (lowest.most - lowest.work)), find)) is not None:
                 return _with_fewer(lowest, found)
@@ -350,7 +324,7 @@ def _in_every_state(lowest: Lowest, find: Callable[[Lowest], Certificate | None]
     return None if found is None else _with_fewer(lowest, found)
 
 
-def _by_bounds(lowest: Lowest) -> Certificate | None:
+def by_bounds(lowest: Lowest) -> Certificate | None:
     """Return a certificate that some goals, in any state, violate a constraint or the bounds of a derived amount.
 
     Without goals, an amount can have its initial value, which is never an excess; therefore each excess involves goals.
@@ -368,7 +342,7 @@ def _by_bounds(lowest: Lowest) -> Certificate | None:
     return None
 
 
-def _by_definitions(lowest: Lowest) -> Certificate | None:
+def by_definitions(lowest: Lowest) -> Certificate | None:
     """Return a certificate that some goals, in any state, contradict the definitions of derived facts."""
     defined = lowest.problem.domain.rules.keys() | lowest.problem.domain.aggregates.keys()
     goals = tuple(Fact(symbol, wanted) for symbol, wanted in sorted(lowest.problem.goal.items()))
@@ -376,7 +350,7 @@ def _by_definitions(lowest: Lowest) -> Certificate | None:
     return _counted(lowest, Certificate(unmet=goals)) if derived else None
 
 
-def _by_pairs(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
+def by_pairs(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
     """Return a certificate that two goals about the same individual can't both hold when all symbols have their rest values."""
     pairs = []
     for (one, a), (other, b) in combinations(sorted(lowest.problem.goal.items()), 2):
@@ -387,12 +361,12 @@ def _by_pairs(lowest: Lowest, relaxed: Relaxed) -> Certificate | None:
     for _, pair in sorted(pairs, key=itemgetter(0)):
         if lowest.work >= lowest.most:
             break
-        if (found := _with_little(lowest, PAIR, partial(_by_cases, lowest, relaxed, pair))) is not None:
+        if (found := _with_little(lowest, PAIR, partial(by_cases, lowest, relaxed, pair))) is not None:
             return found
     return None
 
 
-def _by_cases(lowest: Lowest, relaxed: Relaxed, goal: State) -> Certificate | None:
+def by_cases(lowest: Lowest, relaxed: Relaxed, goal: State) -> Certificate | None:
     """Distinguish more and more values until the goal, or a part of the goal, holds in no case."""
     certificate = Certificate(cases=0)
     while True:
@@ -408,7 +382,7 @@ def _by_cases(lowest: Lowest, relaxed: Relaxed, goal: State) -> Certificate | No
         certificate = refined
 
 
-def _by_states(lowest: Lowest) -> Certificate | None:
+def by_states(lowest: Lowest) -> Certificate | None:
     """Return a certificate that distinguishes all values: each case is a state, and none satisfies the goal and the rest values."""
     problem = lowest.problem
     told_apart: dict[Symbol, tuple[str, ...]] = {}

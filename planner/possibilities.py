@@ -8,7 +8,7 @@ true only if the condition holds in every state of the set. For a single, comple
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
@@ -119,8 +119,7 @@ class Lowest:
                 self.holders.setdefault(symbol.situation, []).append((symbol.arguments, value))
         self._rows: dict[tuple[str, int], dict[str, list[tuple[str, ...]]]] = {}
         self._steps: dict[tuple[int, frozenset[str]], list[tuple[Condition, tuple[str, ...]]]] = {}
-        self._inner: dict[int, tuple[Condition, ...]] = {}
-        self._asked: dict[tuple[int, int], tuple[Condition, ...]] = {}
+        self._conjunctions: dict[tuple[int, ...], tuple[Condition, ...]] = {}
         self._kept: list[object] = []  # keeps objects alive, so that Python reuses no id
 
     def spend(self, work: int = 1) -> None:
@@ -212,27 +211,25 @@ class Lowest:
 
     def asked(self, behavior: Behavior, when: tuple[Condition, ...] = ()) -> tuple[Condition, ...]:
         """Return the preconditions of a behaviour, the conditions `when` of an effect, and the classes of the parameters."""
-        key = id(behavior), id(when)
-        if key not in self._asked:
-            self._kept += [behavior, when]
-            kinds = tuple(ClassCondition(parameter.name, parameter.kind) for parameter in behavior.parameters)
-            self._asked[key] = (*behavior.preconditions, *when, *kinds)
-        return self._asked[key]
+        kinds = (ClassCondition(p.name, p.kind) for p in behavior.parameters)
+        return self._once((behavior, when), lambda: (*behavior.preconditions, *when, *kinds))
 
     def inside(self, witness: Witness) -> tuple[Condition, ...]:
         """Return the conditions of a witness, including the class of its variable."""
-        if id(witness) not in self._inner:
-            self._kept.append(witness)
-            self._inner[id(witness)] = (ClassCondition(witness.variable, witness.kind), *witness.conditions)
-        return self._inner[id(witness)]
+        return self._once((witness,), lambda: (ClassCondition(witness.variable, witness.kind), *witness.conditions))
 
     def over(self, aggregate: Aggregate) -> tuple[Condition, ...]:
         """Return the conditions of an aggregate, including the classes of its variables."""
-        if id(aggregate) not in self._inner:
-            self._kept.append(aggregate)
-            kinds = (ClassCondition(variable.name, variable.kind) for variable in aggregate.variables)
-            self._inner[id(aggregate)] = (*aggregate.conditions, *kinds)
-        return self._inner[id(aggregate)]
+        kinds = (ClassCondition(variable.name, variable.kind) for variable in aggregate.variables)
+        return self._once((aggregate,), lambda: (*aggregate.conditions, *kinds))
+
+    def _once(self, of: tuple[object, ...], made: Callable[[], tuple[Condition, ...]]) -> tuple[Condition, ...]:
+        """Return the conjunction that was made for some objects; it is the same object each time, as `steps` requires."""
+        key = tuple(map(id, of))
+        if key not in self._conjunctions:
+            self._kept.append(of)
+            self._conjunctions[key] = made()
+        return self._conjunctions[key]
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import signal
 import warnings
 import zlib
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
@@ -54,6 +54,9 @@ MOST = 5_000
 OPTIMAL, PAPER, STRICT, EXPORTS, EXECUTIONS, LESSONS, READERS, CERTIFICATES, RECOGNITION = 3, 2, 3, 8, 6, 8, 250, 4, 8
 STEPS, SOFT = 12, 8
 """Sampling intervals of expensive checks: with an interval n, one of n worlds is checked."""
+KINDS = ("facts", "bounds", "pairs", "cases", "states")
+"""Kinds of certificates: unreachable facts; goals that exclude each other in every state; two goals that exclude each other;
+distinguished values; all values."""
 LEFT_OUT, CERTIFYING = 3, 100_000
 """Number of behaviours that are left out in turn for false certificates, and maximum work for each certificate."""
 MOST_ACTIONS = 1_500
@@ -117,10 +120,26 @@ def limited(seconds: float) -> Iterator[None]:
 
 
 def certificate(kind: str, problem: Problem) -> Certificate | None:
-    """Return a certificate of a kind, or of any kind for ``all``; None if none is found."""
-    from confab.planner.certifying import certify, of_kind
+    """Return a certificate of one of the `KINDS`, found without the other kinds, or of any kind for ``all``; or None.
 
-    return certify(problem, CERTIFYING) if kind == "all" else of_kind(kind, problem, CERTIFYING)
+    In `certify`, a certificate of one kind can hide a fault in the search for another kind.
+    """
+    from confab.planner import certifying
+    from confab.planner.possibilities import Lowest, WorkLimitError
+
+    lowest = Lowest(problem, CERTIFYING)
+    relaxed = certifying.Relaxed(lowest)
+    searches: dict[str, Callable[[], Certificate | None]] = {
+        "all": lambda: certifying.certify(problem, CERTIFYING),
+        "facts": lambda: relaxed.certificate(problem.goal),
+        "bounds": lambda: certifying.by_bounds(lowest) or certifying.by_definitions(lowest),
+        "pairs": lambda: certifying.by_pairs(lowest, relaxed),
+        "cases": lambda: certifying.by_cases(lowest, relaxed, problem.goal),
+        "states": lambda: certifying.by_states(lowest),
+    }
+    with suppress(WorkLimitError, RecursionError):
+        return searches[kind]()
+    return None
 
 
 def of_lesser_tasks(problem: Problem, rng: Random) -> Iterator[tuple[str, Certificate]]:
@@ -512,7 +531,6 @@ class Judge:
         remark. The checker must reject certificates that have lost a claim or have a false one.
         """
         from confab.planner.certificate_checks import refusal
-        from confab.planner.certifying import KINDS
 
         def judged(kind: str) -> None:
             problem, found, mode = read.reading.problem, self.found, f"proofs by {kind}"

@@ -17,7 +17,7 @@ from typing import TypeAlias
 from confab.planner.acting.episode import Episode
 from confab.planner.plan import Limits, Plan, Planner, Status, Step
 from confab.reasoner.refutations import Refutation
-from confab.reasoner.symbols import Fact, Problem, RelationCondition, ValueEffect
+from confab.reasoner.symbols import Fact, Problem, RelationCondition
 
 Static: TypeAlias = "tuple[str, tuple[str, ...]]"
 """A static fact: relation and individuals."""
@@ -108,7 +108,8 @@ def _above(problem: Problem, one: Refutation, likewise: Collection[str]) -> Iter
     every, own = problem.domain.behaviors, problem.domain.behaviors[one.behavior]
     bound = {parameter.name: name for parameter, name in zip(own.parameters, one.arguments, strict=True) if name}
     for effect in own.effects:
-        same = [(other, e) for other in every.values() for e in other.effects if _same_effect(e, effect)]
+        made = effect.situation, effect.value
+        same = [(other, e) for other in every.values() for e in other.effects if (e.situation, e.value) == made]
         if {*effect.arguments} != {*bound} or not {o.name for o, _ in same if o.level == own.level} <= {*likewise}:
             continue
         for other, e in same:
@@ -116,11 +117,6 @@ def _above(problem: Problem, one: Refutation, likewise: Collection[str]) -> Iter
                 renamed = dict(zip(e.arguments, (bound[term] for term in effect.arguments), strict=True))
                 arguments = tuple(renamed.get(parameter.name, "") for parameter in other.parameters)
                 yield replace(one, behavior=other.name, arguments=arguments)
-
-
-def _same_effect(one: ValueEffect, other: ValueEffect) -> bool:
-    """Return whether two effects make the same fact true."""
-    return (one.situation, one.value) == (other.situation, other.value)
 
 
 def chain_to(plan: Plan, path: tuple[int, ...]) -> tuple[Step, ...]:

@@ -330,11 +330,12 @@ class PlanTrace:
                     continue
             asks[ordered_inside(substituted(c, roles))] = None
         own = {term: roles.get(term, term) for term in (*goal.arguments, goal.value, *step[1])}
+        used = {*own.values(), *(term for c in asks for inner in walk(c) for term in terms(inner))}
         return LearnedRule(
             ValueCondition(goal.situation, tuple(own[a] for a in goal.arguments), own[goal.value]),
             tuple(sorted(asks, key=repr)),
             (step[0], tuple(own[a] for a in step[1])),
-            tuple((role, kinds[individual]) for individual, role in roles.items() if self._used(role, asks, own)),
+            tuple((role, kinds[individual]) for individual, role in roles.items() if role in used),
         )
 
     def plainest(self, individual: str, of: str) -> str:
@@ -351,9 +352,6 @@ class PlanTrace:
             if k not in situations and individual in members(k) and (not of or members(k) <= members(of))
         ]
         return max(within, key=lambda k: len(members(k)), default=of)
-
-    def _used(self, role: str, asks: Iterable[Condition], own: Mapping[str, str]) -> bool:
-        return role in own.values() or any(role in terms(inner) for c in asks for inner in walk(c))
 
     # ------------------------------------------------------------------------------------------------------------ order
 

@@ -18,7 +18,7 @@ from confab.planner import certifying
 from confab.planner.certificate_checks import refusal
 from confab.planner.certificates import Certificate, certificate_from, certificate_json
 from confab.planner.certified import certified
-from confab.planner.certifying import _with_fewer, certify, of_kind
+from confab.planner.certifying import WORK, _with_fewer, by_states, certify
 from confab.planner.plan import Limits, Outcome, Reason, Status
 from confab.planner.possibilities import Lowest
 from confab.planner.solve import MODES, Mode, Request, solve
@@ -345,7 +345,7 @@ def test_the_reason_why_an_amount_never_changes_names_every_behaviour_that_could
 def test_a_certificate_that_was_found_in_time_is_kept_if_no_time_is_left_to_remove_its_superfluous_symbols(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    found = ((problem, of_kind("states", problem)) for problem, _ in unsolvable(range(20)))
+    found = ((problem, by_states(Lowest(problem, WORK))) for problem, _ in unsolvable(range(20)))
     problem, certificate = next((problem, one) for problem, one in found if one is not None)
     reads = 0
 
