@@ -348,10 +348,7 @@ class _LevelExecution:
                     yield self.steps[giver].path, Need(why, (FactChange(Fact(symbol, value), without),), path)
 
     def derivation_givers(self, cell: Cell, wanted: str) -> Iterator[tuple[Path, Need]]:
-        """Yield the steps that make true the facts from which a defined goal follows.
-
-        A fact counts only if the derivation of the goal reads the fact, and the goal wouldn't hold without the fact.
-        """
+        """Yield the steps whose facts the derivation of a defined goal reads, and without which the goal wouldn't hold."""
         if cell[0] not in self.problem.domain.rules:
             return
         _, read = self.with_reads(lambda: self.facts.value(*cell))

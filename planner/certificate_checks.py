@@ -169,10 +169,7 @@ class CaseView:
 
 @dataclass
 class FinalView(CaseView):
-    """The values that symbols can have in the final states of a case, in which symbols have their `wanted` values.
-
-    `used` contains the symbols whose wanted values were read.
-    """
+    """The values of symbols in the final states of a case, where symbols have their `wanted` values; `used` are those read."""
 
     wanted: Mapping[Symbol, str] = field(default_factory=dict)
     used: set[Symbol] = field(default_factory=set)

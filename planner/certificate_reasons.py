@@ -340,10 +340,7 @@ class _Causes:
     def lacking(
         self, claim: Claim, behavior: Behavior, conditions: Sequence[Condition], given: dict[str, str]
     ) -> Cause:
-        """Return a smallest set of jointly unsatisfiable conditions that prevents a behaviour from making a claim false.
-
-        Static conditions, which no behaviour changes, are preferred.
-        """
+        """Return a smallest set of conditions, preferably static, that can't hold together and keep a behaviour from its effect."""
         from confab.reasoner.validation.contradictions import clashing
 
         if clash := clashing(conditions, self.problem, behavior.kinds):

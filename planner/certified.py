@@ -21,10 +21,7 @@ ADDED_UP = 200_000
 
 
 def certified(problem: Problem, outcome: Outcome) -> Outcome:
-    """Return an outcome of planning the whole task; "unsolvable" becomes "gave up" if the checker accepts no certificate.
-
-    A certificate that the outcome already has is checked first.
-    """
+    """Return an outcome that is "unsolvable" only with a certificate, given or found, that the checker accepts, else "gave up"."""
     if outcome.status is not Status.UNSOLVABLE:
         return outcome
     from confab.planner.certificate_checks import refusal

@@ -105,12 +105,7 @@ def _at_once(lowest: Lowest, little: int) -> Certificate | None:
 
 
 def _with_little(lowest: Lowest, little: float, find: Callable[[], Certificate | None]) -> Certificate | None:
-    """Return the certificate that `find` returns within a small work limit.
-
-    Return None if `find` exceeds the limit or finds no certificate.
-
-    A `NoTimeLeftError` isn't caught; this error ends the whole search for a certificate.
-    """
+    """Return the certificate that `find` returns within a work limit, or None; a `NoTimeLeftError` ends the whole search."""
     most = lowest.most
     try:
         lowest.most = min(most, lowest.work + little)

@@ -254,10 +254,7 @@ def unified(
     terms: tuple[str | None, ...],
     words: tuple[str | None, ...],
 ) -> dict[str, str] | None:
-    """Return the bindings of a behaviour's variables that make the terms of an effect equal to the given words.
-
-    Return None if there are no such bindings. A word that is None matches any term.
-    """
+    """Return the bindings that make the terms of an effect equal to the words (None fits any term), or None if there are none."""
     found: dict[str, str] = {}
     for term, word in zip(terms, words, strict=True):
         if term is None or word is None:

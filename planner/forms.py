@@ -13,10 +13,7 @@ if TYPE_CHECKING:
 
 
 def digraph(nodes: Sequence[StepPosition]) -> networkx.DiGraph[Path]:
-    """Return a plan as a directed graph whose nodes are the paths of the steps.
-
-    Nodes have the attributes ``label``, ``level`` and ``id``. The attribute ``kind`` of an edge is ``refines`` or ``then``.
-    """
+    """Return a plan as a directed graph, as `confab.planner.plan.Plan.to_networkx` describes it."""
     import networkx
 
     graph: networkx.DiGraph[Path] = networkx.DiGraph()

@@ -183,10 +183,7 @@ def failing_conditions(
         return isinstance(c, ValueCondition) and not c.negated and c.value.startswith("?") and c.value not in terms
 
     def fewest(part: Sequence[int], facts: LoggedState, limit: int) -> tuple[int, ...] | None:
-        """Return the smallest set of conditions in `part` whose removal makes the remaining conditions true.
-
-        Return None if the set would have more than `limit` conditions.
-        """
+        """Return the smallest set of at most `limit` conditions in `part` without which the others hold, or None."""
         for without in (c for size in range(min(len(part), limit) + 1) for c in combinations(part, size)):
             if rules.satisfied([conditions[i] for i in part if i not in without], terms, kinds, facts) is not None:
                 return without

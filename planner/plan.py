@@ -219,10 +219,7 @@ class Plan(Sequence[Step], metaclass=RightNames):
         return dot(self._positions())
 
     def to_records(self) -> list[dict[str, object]]:
-        """Return a record for each step, with its path, level, ID, behaviour, arguments and bindings.
-
-        Each step comes before its sub-steps. Steps that are refined together have the same path.
-        """
+        """Return a record for each step in the order of `walk`; steps that are refined together have the same path."""
         return [
             {
                 "path": ".".join(map(str, step.path)),

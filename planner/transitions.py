@@ -147,10 +147,7 @@ class PythonWriter:
         }
 
     def function(self, lines: Iterable[str], result: str, given: str = "") -> Callable[..., Any]:
-        """Return a function that executes the given lines and returns the expression `result`.
-
-        The parameters of the function are `now` and `holders` of a table, and the names in `given`.
-        """
+        """Return a function of a table's `now` and `holders`, and of `given`, that executes lines and returns an expression."""
         body = [f"    {line}" for line in (*lines, f"return {result}")]
         text = "\n".join(body)
         names = [f"    {name} = {table}" for name, table in self._tables.items() if name in text]

@@ -52,10 +52,7 @@ class Fault:
 
 
 def validate(problem: Problem, plan: Plan) -> list[Fault]:
-    """Return the faults of a plan; the list is empty for a valid plan.
-
-    The faults are wrong IDs of steps, and the faults that `carried_out` finds.
-    """
+    """Return the faults that `carried_out` finds in a plan, and its wrong IDs; the list is empty for a valid plan."""
     steps = [step for node in plan.walk() for step in node.together if _fits(problem, step)]
     numbered = [(step, problem.id_of(step.behavior, step.arguments)) for step in steps]
     wrong = [
@@ -400,10 +397,7 @@ class LoggedState:
 
 
 class BehaviorReader:
-    """The preconditions and effects of a problem's behaviours; each behaviour is compiled at its first use.
-
-    `carried_out` describes the parameters `lookups` and `lifted`.
-    """
+    """The behaviours of a problem, each compiled at its first use; for `lookups` and `lifted`, see `carried_out`."""
 
     def __init__(
         self, problem: Problem, lookups: Lookups | None = None, lifted: Mapping[str, Behavior] | None = None
@@ -453,10 +447,7 @@ class BehaviorReader:
         return len(arguments) == len(members) and all(map(contains, members, arguments))
 
     def changes(self, behavior: Behavior, arguments: Arguments, facts: LoggedState) -> list[NewValue] | None:
-        """Return the values that a behaviour gives to symbols, in order, or None if the behaviour isn't applicable.
-
-        The arguments must belong to the classes of the parameters.
-        """
+        """Return the values that a behaviour gives to symbols, in order, or None if it isn't applicable; the arguments must fit."""
         read = self.read(behavior)
         values = [*arguments, *read.terms[len(arguments) :]]
         if not all_hold(read.preconditions, facts, values):
@@ -480,10 +471,7 @@ class BehaviorReader:
         return None if more is None else found + more
 
     def beyond(self, behavior: Behavior, arguments: Arguments, facts: LoggedState) -> tuple[Fact, Fact] | None:
-        """Return the first amount that a behaviour would make invalid: the amount before and after the behaviour.
-
-        Return None if every new amount is allowed, or if the behaviour isn't applicable.
-        """
+        """Return the first amount that a behaviour would make invalid, before and after the behaviour, or None."""
         read = self.read(behavior)
         values = [*arguments, *read.terms[len(arguments) :]]
         if not all_hold(read.preconditions, facts, values):

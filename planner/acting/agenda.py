@@ -34,10 +34,7 @@ class RemainingSteps:
 
 @dataclass
 class Postponed:
-    """Postponed goals, each with its value and the reason for postponing it.
-
-    The goals `aside` are impossible in the present situation. The goals `put_off` are unreachable without the facts in doubt.
-    """
+    """Goals, each with value and reason: `aside` are now impossible, `put_off` are unreachable without the facts in doubt."""
 
     aside: dict[Symbol, tuple[str, Reason]] = field(default_factory=dict)
     put_off: dict[Symbol, tuple[str, Reason]] = field(default_factory=dict)

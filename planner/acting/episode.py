@@ -226,11 +226,7 @@ class Episode:
 
 @dataclass(frozen=True)
 class Event:
-    """An event for observers of the execution.
-
-    `seconds` is the time on the world's clock; `belief` is the executive's task, with the present situation as its
-    initial state.
-    """
+    """An event for observers, with the time on the world's clock, and the executive's task (`belief`) in the present situation."""
 
     what: str  # plan, begin, end, intervention, discovery, repair, replan, over
     plan: Plan

@@ -125,10 +125,7 @@ def chain_to(plan: Plan, path: tuple[int, ...]) -> tuple[Step, ...]:
 
 
 def relied_on_by(problem: Problem, chain: Sequence[Step]) -> list[Static]:
-    """Return the static facts that a primitive relied on.
-
-    If the primitive relied on no static fact, return the static facts of its nearest ancestor that relied on static facts.
-    """
+    """Return the static facts on which a primitive relied, or if there are none, its nearest ancestor that relied on any."""
     for step in reversed(chain):
         found = [static for one in step.together for static in _static_of(problem, one)]
         if found:

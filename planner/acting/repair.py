@@ -219,10 +219,7 @@ def vanished(problem: Problem, why: Callable[[str], str] = lambda one: "") -> li
 
 
 def difference(old: Iterable[Step], new: Iterable[Step]) -> tuple[int, int]:
-    """Return two numbers: how many primitives the new steps drop, and how many primitives they add.
-
-    The two sequences are compared in order: a primitive at another position counts as dropped and added.
-    """
+    """Return how many primitives the new steps drop and add; a primitive at another position counts as dropped and added."""
     before, after = (tuple((p.behavior, p.arguments) for p in Plan(tuple(steps)).primitives) for steps in (old, new))
     same = sum(block.size for block in SequenceMatcher(None, before, after, autojunk=False).get_matching_blocks())
     return len(before) - same, len(after) - same

@@ -179,10 +179,7 @@ def _is_whereabouts(problem: Problem, situation: str) -> bool:
 
 
 def with_individual(problem: Problem, individual: str, kind: str) -> Problem:
-    """Return the problem with one more individual, which comes last in the order of each of its classes.
-
-    The effects on all members of a class are also effects on this individual.
-    """
+    """Return the problem with an individual that comes last in each of its classes, and to which effects on the classes apply."""
     kinds, waiting = {kind}, [kind]
     while waiting:
         for parent in problem.parents.get(waiting.pop(), ()):

@@ -113,10 +113,7 @@ class FactReader:
 
 
 def fillers(method: Method, roles: Sequence[str | None], problem: Problem) -> list[RoleFact]:
-    """Return the facts about each individual in an open role of a small class.
-
-    One fact is about the individual alone. Each other fact is about the individual together with an individual of the step.
-    """
+    """Return the facts about each individual in an open role of a small class, alone and together with individuals of the step."""
     found = list[RoleFact]()
     for role, individual in zip(method.open, roles[method.roles :], strict=True):
         if role.source is None and individual is not None and 1 < len(problem.members(role.kind)) <= CROWD:

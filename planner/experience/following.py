@@ -306,10 +306,7 @@ class RulePolicy:
     # --------------------------------------------------------------------------------------------------------- goals jointly
 
     def other_open_goal(self, targets: Mapping[Cell, str]) -> Goal | None:
-        """Return a reachable open goal that has the situation type of a target and isn't a target.
-
-        Return None if there is no such goal, or if reachability was already checked for the situation type.
-        """
+        """Return a reachable open goal of a target's situation type that isn't checked yet and isn't a target, or None."""
         kinds = {cell[0] for cell in targets} - self.passed if self.serial else set()
         for cell, value in reversed(self.call.goal.items()) if kinds else ():
             if cell[0] in kinds and cell not in targets and not self.call.met(cell):

@@ -192,10 +192,7 @@ class Instances:
         return meets(self.call.table.now[situation].get(key, FALSE), value)
 
     def distance(self, level: int, goal: Goal) -> float:
-        """Return the cost of a goal with the individuals that the state suggests, or otherwise with any individuals.
-
-        The cost is infinite if no chain of rules achieves the goal.
-        """
+        """Return the cost of a goal with suggested individuals, or else with any; infinite if no chain of rules achieves it."""
         cost = self.cost(level, goal, False)
         return cost if cost < inf else self.cost(level, goal, True)
 

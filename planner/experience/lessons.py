@@ -47,10 +47,7 @@ CHOSEN, PASSED, FAILED = Tally(chosen=1), Tally(passed_over=1), Tally(failed=1)
 
 
 def teach(experience: Experience, problem: Problem, plan: Plan | None = None) -> Plan | None:
-    """Learn how to solve a problem, with its goals in several orders and separately; return the plan.
-
-    Without a given plan to learn from, the function plans; it returns None if it finds no plan.
-    """
+    """Learn to solve a problem, with its goals in several orders and separately; return the given or found plan, or None."""
     using = compiled(problem)
     plan = plan or fast.plan(problem, limits=SHORT, using=using).plan
     if plan is None:
@@ -261,10 +258,7 @@ def possible(call: Call, method: Method, roles: Roles) -> bool:
 
 
 def trace_of(call: Call, mark: int, targets: Mapping[Cell, str], keep: Keep, done: Sequence[Ground]) -> PlanTrace:
-    """Return the trace of the steps of a level since a marked state.
-
-    The trace begins with the marked state. The goals of the trace are the targets and the values to be kept.
-    """
+    """Return the trace of a level's steps since a marked state, whose goals are the targets and the values to be kept."""
     before, state = call.table.before(mark), call.table.state()
     goal = {}
     for cell, first in before.items():

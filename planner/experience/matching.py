@@ -129,10 +129,7 @@ class _Join:
         return lines
 
     def tests(self, role: str) -> list[str]:
-        """Mark a role as bound; return the tests on the role's individual.
-
-        The tests concern the individual's class, whether the individual fills another role, and the rule's conditions.
-        """
+        """Mark a role as bound; return the tests of its individual: the class, other roles, and the rule's conditions."""
         members = self.problem.members
         mine = members(self.kinds[role])
         others = [r for r in sorted(self.bound) if not members(self.kinds[r]).isdisjoint(mine)]

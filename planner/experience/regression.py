@@ -339,10 +339,7 @@ class PlanTrace:
         )
 
     def plainest(self, individual: str, of: str) -> str:
-        """Return the given class `of`, unless `of` is empty or a situation type.
-
-        Otherwise return the individual's widest class that is within `of` and isn't a situation type.
-        """
+        """Return `of`, or if it is empty or a situation type, the individual's widest class within `of` that isn't one."""
         members, situations = self.problem.members, self.problem.domain.situations
         if of and of not in situations:
             return of

@@ -24,10 +24,7 @@ class Applied:
 
 
 class Model:
-    """The behaviours of one problem as functions of states that are tuples.
-
-    The symbols are those of the initial state, all boolean symbols, and the defined symbols of the goal.
-    """
+    """The behaviours of a problem as functions of tuples of values: of stated and boolean symbols, and defined goals."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
@@ -113,11 +110,7 @@ def _symbols(problem: Problem) -> tuple[Symbol, ...]:
 
 
 def ground(problem: Problem, level: int) -> tuple[GroundBehavior, ...]:
-    """Return all quantified behaviours of a level in the order of their IDs.
-
-    The arguments are computed from the classes of the problem. The SPARQL queries of
-    `confab.reasoner.reading.quantification` return the same behaviours.
-    """
+    """Return all quantified behaviours of a level in the order of their IDs, as the SPARQL queries of quantification do."""
     number = problem.domain.first_ids.get(level, 0)
     found: list[GroundBehavior] = []
     for behavior in problem.domain.at_level(level):
