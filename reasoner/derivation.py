@@ -25,8 +25,8 @@ from confab.reasoner.symbols import (
     Witness,
 )
 
-TASK = "Task"
-"""The class of tasks; the argument of a goal's derived situation type is a task."""
+TASK = "core:Task"
+"""The class of tasks; the argument of a goal's derived situation type is a task. A domain may have its own class *Task*."""
 
 
 def conditions_of_goal(domain: Domain, symbol: Symbol) -> tuple[Condition, ...]:

@@ -23,7 +23,7 @@ V = TypeVar("V")
 
 
 class Names:
-    """A one-to-one mapping of IRIs and short names.
+    """A one-to-one mapping of IRIs and short names; `more` has names that are given.
 
     >>> names = Names(["https://x.org/a#cup1", "https://x.org/b#cup1", "https://x.org/a#plate"])
     >>> names.short("https://x.org/a#plate"), names.short("https://x.org/b#cup1")
@@ -32,7 +32,7 @@ class Names:
     'https://x.org/a#cup1'
     """
 
-    def __init__(self, iris: Iterable[str]) -> None:
+    def __init__(self, iris: Iterable[str], more: Mapping[str, str] = {}) -> None:
         by_local = defaultdict(list)
         for iri in checked(set(iris), "reading the scene"):
             by_local[local_name(iri)].append(iri)
@@ -41,6 +41,7 @@ class Names:
             for iri in sorted(group):
                 name = local if len(group) == 1 else f"{_ontology_name(iri)}:{local}"
                 self._iris[name if name not in self._iris else iri] = iri
+        self._iris |= more
         self._names = {iri: name for name, iri in self._iris.items()}
 
     def short(self, iri: str) -> str:

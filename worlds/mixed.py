@@ -19,7 +19,7 @@ from typing import Any
 
 from confab.reasoner.aggregates.dependencies import read_by
 from confab.reasoner.amounts import Amount, Quantity, bounds, written
-from confab.reasoner.derivation import circular
+from confab.reasoner.derivation import TASK, circular
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -166,13 +166,13 @@ def _with_derived_goal(world: RandomWorld, meant: Interpreter) -> tuple[RandomWo
     if "|" not in kind.arguments[0] and (not others or rng.random() < 0.4):
         some = Symbol(symbol.situation, ("?w", *symbol.arguments[1:]))
         wanted = Witness("?w", kind.arguments[0], _as_conditions(problem, some, value))
-    rule = Rule("goal0", (Parameter("?task", "Task"),), (), (wanted,))
+    rule = Rule("goal0", (Parameter("?task", TASK),), (), (wanted,))
     level = max(domain.situations[s].level for s in named([wanted]))
-    derived = SituationType("goal0", ("Task",), "Truth", level, boolean=True, default=FALSE)
+    derived = SituationType("goal0", (TASK,), "Truth", level, boolean=True, default=FALSE)
     more = replace(domain, situations={**domain.situations, "goal0": derived}, rules={**domain.rules, "goal0": (rule,)})
     left = dict(list(problem.goal.items())[2 if isinstance(wanted, AnyOf) else 1 :])
     goal = {Symbol("goal0", ("task",)): TRUE, **left}
-    changed = replace(problem, domain=more, goal=goal, classes={**problem.classes, "Task": ("task",)})
+    changed = replace(problem, domain=more, goal=goal, classes={**problem.classes, TASK: ("task",)})
     other = Interpreter(changed)
     if other.wanted(other.initial):
         return world, meant

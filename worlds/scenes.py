@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, bounds, written
+from confab.reasoner.derivation import TASK
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -68,13 +69,13 @@ class _Scene:
     def lines(self) -> Iterator[str]:
         yield from self.classes()
         for one in self.situations.values():
-            if one.arguments != ("Task",):
+            if one.arguments != (TASK,):
                 yield from self.situation(one)
         for relation, kind in (("near", "owl:ObjectProperty"), ("size", "owl:DatatypeProperty")):
             if relation in self.problem.relations:
                 yield self.node(relation, f"{kind}, owl:NamedIndividual, c:Relation")
         for name, rules in self.problem.domain.rules.items():
-            if self.situations[name].arguments == ("Task",):
+            if self.situations[name].arguments == (TASK,):
                 continue
             yield from self.world.axioms.get(name, ())
             for number, rule in enumerate(() if name in self.world.axioms else rules):

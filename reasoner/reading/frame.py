@@ -11,7 +11,7 @@ from confab.reasoner.aggregates.dependencies import in_order, read_by, unfolded
 from confab.reasoner.aggregates.extrema import extrema_replaced
 from confab.reasoner.aggregates.remembering import NONE_ALLOWED, solutions_of
 from confab.reasoner.amounts import Amount, Quantity, inside, written
-from confab.reasoner.derivation import circles, needed
+from confab.reasoner.derivation import TASK, circles, needed
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.language import DomainError, walk
 from confab.reasoner.names import Names, local_name
@@ -160,7 +160,8 @@ def names_of(schema: OntologySchema, members: Iterable[Member], namesakes: Itera
             *chain.from_iterable((individual, kind) for individual, kind, _ in members if individual not in nodes),
             *chain.from_iterable((sub, *above) for sub, above in schema.supers.items()),
             *(kind for node in typed for name in ("termType", "ofClass") for kind in node.get(CORE + name, ())),
-        }
+        },
+        {TASK: CORE + "Task"} if derived else {},
     )
 
 
