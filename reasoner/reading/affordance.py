@@ -261,6 +261,17 @@ def allowed_together(behavior: Behavior, situations: Mapping[str, SituationType]
                         yield AnyOf(((*where, Comparison(total, wrong, limit)),), negated=True)
 
 
+def calculable(behavior: Behavior) -> Iterator[Condition]:
+    """Yield the preconditions that the price of a behaviour isn't negative and that the numbers of its effects exist."""
+    if behavior.price is not None:
+        yield Comparison(behavior.price, ">=", Fraction(0))
+    for effect in behavior.amounts:
+        if not isinstance(effect.amount, Fraction):
+            before = Amount(effect.situation, effect.arguments)
+            lacking = Comparison(effect.amount, "=", effect.amount, negated=True)
+            yield AnyOf(((*effect.when, Comparison(before, "=", before), lacking),), negated=True)
+
+
 def _may_coincide(one: AmountEffect, other: AmountEffect) -> bool:
     """Return whether two effects can change the same symbol."""
     pairs = zip(one.arguments, other.arguments, strict=True)
@@ -294,7 +305,7 @@ class _PatternWriter:
         names = self.names(behavior, when)
         kinds = behavior.kinds
         situations = self.reading.problem.domain.situations
-        bounds = (*allowed(behavior, situations), *allowed_together(behavior, situations))
+        bounds = (*allowed(behavior, situations), *allowed_together(behavior, situations), *calculable(behavior))
         conditions = (*behavior.preconditions, *bounds, *when)
         lines = [f"{{ SELECT DISTINCT {name} WHERE {{ {self.typed(name, kinds[name])} }} }}" for name in names]
         lines += [line for condition in conditions for line in self.pattern(condition)]

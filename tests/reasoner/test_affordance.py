@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+import confab
 from confab.planner.paper.transitions import Model, ground
 from confab.reasoner.graph.inference import infer
 from confab.reasoner.graph.knowledge import KnowledgeGraph, load, text
@@ -141,3 +142,35 @@ def test_affordances_take_defined_situation_types_into_account() -> None:
         tuple(local_name(text(term)) for term in row) for row in graph.select(inside, [SITUATION.rsplit(":", 1)[-1]])
     }
     assert rows == {("casket", "chest"), ("casket", "hall"), ("chest", "hall"), ("ring", "hall")}
+
+
+WATER = """@prefix : <https://example.org/water#> .
+@prefix c: <https://w3id.org/confab/core#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+@prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
+<https://example.org/water> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> ; c:symbolicOnly true .
+:Tank a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object ; c:hasSituationType :LEVEL .
+:LEVEL a owl:NamedIndividual, c:SituationType, c:Amount ; c:valueProperty :level .
+:level a owl:DatatypeProperty, owl:FunctionalProperty, owl:NamedIndividual ; rdfs:domain :Tank ; rdfs:range xsd:decimal .
+:rate a owl:DatatypeProperty, owl:NamedIndividual, c:Relation ; rdfs:domain :Tank ; rdfs:range xsd:decimal .
+:FILL a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 1 ; c:update \"\"\"
+    DELETE { ?tank :level ?old } INSERT { ?tank :level ?new }
+    WHERE { ?tank a :Tank . ?tap a :Tank . ?tank :level ?old . ?tap :rate ?rate BIND(?old + ?rate AS ?new) }\"\"\" .
+:DRAIN a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 2 ; c:price :DRAIN.price ; c:update \"\"\"
+    DELETE { ?tank :level ?old } INSERT { ?tank :level 0 } WHERE { ?tank a :Tank . ?tank :level ?old }\"\"\" .
+:DRAIN.tank a owl:NamedIndividual .
+:DRAIN.price a owl:NamedIndividual, c:Calculation ; c:relation :rate ; c:about :DRAIN.tank .
+:one a owl:NamedIndividual, :Tank ; c:index 1 ; :level 1.0 ; :rate 2.0 .
+:two a owl:NamedIndividual, :Tank ; c:index 2 ; :level 2.0 ; :rate -1.0 .
+:three a owl:NamedIndividual, :Tank ; c:index 3 ; :level 3.0 .
+:task a owl:NamedIndividual, c:Task ; c:goal :task.full .
+:task.full a owl:NamedIndividual, c:Comparison ; c:about :one ; c:situationType :LEVEL ; c:sign ">=" ; c:amount 3.0 .
+"""
+
+
+def test_a_behaviour_is_applicable_only_if_its_price_and_the_numbers_of_its_effects_exist() -> None:
+    scene = confab.load(WATER)
+    assert [tuple(row) for row in scene.query(scene.applicable_query("DRAIN"))] == [("one",)]
+    filled = {tuple(row) for row in scene.query(scene.applicable_query("FILL"))}
+    assert filled == {(tank, tap) for tank in ("one", "two", "three") for tap in ("one", "two")}
