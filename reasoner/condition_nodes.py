@@ -367,7 +367,7 @@ class NodeReader:
 
     def arguments(self, iri: str) -> tuple[str, ...]:
         """Return the names of a node's arguments, in order."""
-        return tuple(self.term(value) for name in ARGUMENTS for value in self.values(iri, name)[:1])
+        return tuple(self.term(self.one(iri, name)) for name in ARGUMENTS if self.values(iri, name))
 
     def situation(self, iri: str) -> str:
         """Return the IRI of a node's situation type."""

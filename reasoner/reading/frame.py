@@ -27,6 +27,7 @@ from confab.reasoner.reading.rows import (
     OntologySchema,
     classes_of,
     derived_goals,
+    goals_of,
     is_a,
     ordered,
 )
@@ -149,7 +150,7 @@ def names_of(schema: OntologySchema, members: Iterable[Member], namesakes: Itera
     """Return unique short names for a schema's terms, some individuals, and other IRIs with the same local names."""
     nodes = schema.nodes
     typed = (nodes[iri] for iri in schema.of_kind("Parameter", "Variable", *WITH_CLASS))
-    derived = {*derived_goals(schema)}
+    derived = {*derived_goals(schema), *(iri for iri in goals_of(nodes) if CORE + "weight" in nodes[iri])}
     return Names(
         {
             *schema.of_kind("SituationType", "Behavior", "Relation", "ReachRelation"),
@@ -161,7 +162,7 @@ def names_of(schema: OntologySchema, members: Iterable[Member], namesakes: Itera
             *chain.from_iterable((sub, *above) for sub, above in schema.supers.items()),
             *(kind for node in typed for name in ("termType", "ofClass") for kind in node.get(CORE + name, ())),
         },
-        {TASK: CORE + "Task"} if derived else {},
+        {TASK: CORE + "Task"},
     )
 
 

@@ -15,7 +15,7 @@ from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.language import is_variable, terms, walk
 from confab.reasoner.names import nearest
 from confab.reasoner.reading.parts import Parts
-from confab.reasoner.reading.rows import competing_goals, is_a
+from confab.reasoner.reading.rows import is_a
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -147,46 +147,52 @@ def with_task(problem: Problem, parts: Parts, tasks: Iterable[str]) -> Problem:
         Two goals contradict each other, or a goal mentions an individual that isn't in the scene.
     """
     goal, weights = dict[Symbol, str](), dict[Symbol, Fraction]()
-    competing = competing_goals(parts.nodes)
-    for task in tasks:
-        goals = parts.values(task, "goal")
-        for iri, wanted in ((goal, one) for goal in goals for one in _wanted(parts, goal, problem.classes)):
-            weight = _weight(parts, iri)
-            if iri in competing or not _is_fact(wanted, problem):
-                problem, symbol = with_derived_goal(problem, parts.names.short(task), parts.names.short(iri), wanted)
-                goal[symbol] = TRUE
-                weights |= {} if weight is None else {symbol: weight}
-                continue
-            if isinstance(wanted, Comparison):
-                symbol, value = _bounds(iri, wanted)
-                if symbol in goal and weights.get(symbol) != weight:
-                    raise KnowledgeError(
-                        f"<{iri}>: two goals for {symbol} have different weights; give both the same c:weight"
-                    )
-                value = bounds_written(f"{goal[symbol]},{value}" if symbol in goal else value)
-                goal[symbol] = value
-                weights |= {} if weight is None else {symbol: weight}
-                if symbol not in problem.initial:
-                    raise KnowledgeError(f"<{iri}>: there is no {symbol}; the scene states no amount of it")
-                continue
-            assert isinstance(wanted, ValueCondition)
-            symbol = Symbol(wanted.situation, wanted.arguments)
-            check_arguments(symbol, problem.domain, "a goal")
-            value = _other_values(wanted, problem)[0] if wanted.negated else wanted.value
-            kind = problem.domain.situations[symbol.situation]
-            members = (problem.classes.get(of, ()) for of in kind.arguments)
-            if value == FALSE and not all(a in its for a, its in zip(symbol.arguments, members, strict=True)):
-                continue  # the symbol doesn't exist
+    found = [(task, iri, _weight(parts, iri)) for task in tasks for iri in parts.values(task, "goal")]
+    found.sort(key=lambda one: one[2] is not None)  # hard goals first
+    for task, iri, weight, wanted in (
+        (*one, wanted) for one in found for wanted in _wanted(parts, one[1], problem.classes)
+    ):
+        taken = weight is not None and _symbol_of(wanted) in goal  # the goal counts by itself
+        if taken or not _is_fact(wanted, problem):
+            problem, symbol = with_derived_goal(problem, parts.names.short(task), parts.names.short(iri), wanted)
+            goal[symbol] = TRUE
             weights |= {} if weight is None else {symbol: weight}
-            if goal.setdefault(symbol, value) != value:
-                raise KnowledgeError(
-                    f"two goals require that {symbol} is {goal[symbol]} and {value}; drop one of the goals"
-                )
-            if symbol not in problem.initial and not problem.domain.situations[symbol.situation].boolean:
-                raise KnowledgeError(
-                    f"<{iri}>: there is no {symbol}; the object or its situation type isn't in the scene"
-                )
+            continue
+        if isinstance(wanted, Comparison):
+            symbol, value = _bounds(iri, wanted)
+            value = bounds_written(f"{goal[symbol]},{value}" if symbol in goal else value)
+            goal[symbol] = value
+            weights |= {} if weight is None else {symbol: weight}
+            if symbol not in problem.initial:
+                raise KnowledgeError(f"<{iri}>: there is no {symbol}; the scene states no amount of it")
+            continue
+        assert isinstance(wanted, ValueCondition)
+        symbol = Symbol(wanted.situation, wanted.arguments)
+        check_arguments(symbol, problem.domain, "a goal")
+        value = _other_values(wanted, problem)[0] if wanted.negated else wanted.value
+        kind = problem.domain.situations[symbol.situation]
+        if value in (TRUE, FALSE) and not kind.boolean:
+            raise KnowledgeError(f"<{iri}>: the goal is about {symbol}, but states no value of it; name one as c:value")
+        members = (problem.classes.get(of, ()) for of in kind.arguments)
+        if value == FALSE and not all(a in its for a, its in zip(symbol.arguments, members, strict=True)):
+            continue  # the symbol doesn't exist
+        weights |= {} if weight is None else {symbol: weight}
+        if goal.setdefault(symbol, value) != value:
+            raise KnowledgeError(
+                f"two goals require that {symbol} is {goal[symbol]} and {value}; drop one of the goals"
+            )
+        if symbol not in problem.initial and not problem.domain.situations[symbol.situation].boolean:
+            raise KnowledgeError(f"<{iri}>: there is no {symbol}; the object or its situation type isn't in the scene")
     return replace(problem, goal=dict(sorted(goal.items())), weights=weights)
+
+
+def _symbol_of(wanted: Condition) -> Symbol | None:
+    """Return the symbol of a goal that is about one symbol."""
+    match wanted:
+        case ValueCondition(situation, arguments) | Comparison(Amount(situation, arguments)):
+            return Symbol(situation, arguments)
+        case _:
+            return None
 
 
 def _weight(parts: Parts, iri: str) -> Fraction | None:
@@ -252,8 +258,8 @@ def _wanted(parts: Parts, iri: str, classes: Mapping[str, tuple[str, ...]]) -> l
 
     If an argument of the node is a class, there is one goal for each member of the class. A hard conjunction denotes its conjuncts.
     """
-    node = parts.nodes.get(iri, {})
-    if is_a(node, "AllOf") and not parts.flag(iri, "negated") and not parts.values(iri, "weight"):
+    of_several = iri in parts.nodes and is_a(parts.nodes[iri], "AllOf") and not parts.flag(iri, "negated")
+    if of_several and not parts.values(iri, "weight"):
         return list(parts.conditions(iri, "condition"))
     found = parts.condition(iri)
     if not (isinstance(found, Witness) and parts.classes_in(iri)):

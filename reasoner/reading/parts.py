@@ -140,7 +140,7 @@ class Parts(NodeReader):
                 "use a c:Comparison or a c:AmountEffect"
             )
         arguments = self.arguments(iri)
-        value = [self.term(v) for v in self.values(iri, "value")]
+        value = [self.term(self.one(iri, "value"))] if self.values(iri, "value") else []
         if situation in self.pairs:
             arguments, value = (*arguments, *value), []
         return self.names.short(situation), arguments, value[0] if value else TRUE

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -17,7 +17,7 @@ from confab.reasoner.condition_nodes import NodeValues
 from confab.reasoner.graph.knowledge import KnowledgeError, Term, text
 from confab.reasoner.limits import checked
 from confab.reasoner.names import Names, local_name
-from confab.reasoner.vocabulary import ARGUMENTS, CORE, OWL, TYPE
+from confab.reasoner.vocabulary import CORE, OWL, TYPE
 
 FIRST_INDEX_OF_NONE = 10**9  # sorts nodes without an index last, by their names
 DATA = frozenset(
@@ -284,18 +284,10 @@ def derived_goals(schema: OntologySchema) -> list[str]:
             for situation in node.get(CORE + "situationType", ())
         )
 
-    competing = competing_goals(schema.nodes)
-    return sorted(iri for iri in _goals(schema.nodes) if iri in competing or not fact(schema.nodes[iri]))
+    return sorted(iri for iri in goals_of(schema.nodes) if not fact(schema.nodes[iri]))
 
 
-def competing_goals(nodes: Mapping[str, NodeValues]) -> set[str]:
-    """Return the goals with a weight that are about the same situation as another goal, which may exclude them."""
-    places = [CORE + name for name in ("situationType", *ARGUMENTS)]
-    about = {iri: tuple(tuple(nodes[iri].get(place, ())) for place in places) for iri in _goals(nodes)}
-    count = Counter(about.values())
-    return {iri for iri, its in about.items() if count[its] > 1 and CORE + "weight" in nodes[iri]}
-
-
-def _goals(nodes: Mapping[str, NodeValues]) -> list[str]:
+def goals_of(nodes: Mapping[str, NodeValues]) -> list[str]:
+    """Return the nodes that are goals of tasks."""
     goals = dict.fromkeys(iri for node in nodes.values() for iri in node.get(CORE + "goal", ()))
     return [iri for iri in goals if iri in nodes]

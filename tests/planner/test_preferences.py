@@ -167,7 +167,8 @@ STOCK = 'c:Comparison ; {}c:about :store ; c:situationType d:STOCK ; c:sign "{}"
     ("goals", "unmet"),
     [
         ((GLASS.format("c:weight 50.0 ; ", "shop"), GLASS.format("c:weight 1.0 ; ", "store")), [1]),
-        ((GLASS.format("", "shop"), GLASS.format("c:weight 0.5 ; ", "shop")), []),
+        ((GLASS.format("c:weight 0.5 ; ", "shop"), GLASS.format("", "shop")), []),
+        (("c:AllOf ; c:condition :order.shop", GLASS.format("c:weight 0.5 ; ", "store")), [Fraction(1, 2)]),
         ((GLASS.format("c:weight 0.5 ; ", "shop"), GLASS.format("c:weight 500.0 ; ", "cart")), [Fraction(1, 2)]),
         ((STOCK.format("c:weight 1.0 ; ", "<=", "0.0"), STOCK.format("c:weight 1.0 ; ", "<=", "1.0")), [1, 1]),
         (
@@ -179,7 +180,15 @@ STOCK = 'c:Comparison ; {}c:about :store ; c:situationType d:STOCK ; c:sign "{}"
             [1, Fraction(3, 2)],
         ),
     ],
-    ids=["two values", "hard and soft", "the dearer value", "two bounds", "an excluded value", "a conjunction"],
+    ids=[
+        "two values",
+        "hard and soft",
+        "hard conjunction and soft",
+        "the dearer value",
+        "two bounds",
+        "an excluded value",
+        "a conjunction",
+    ],
 )
 def test_each_goal_with_a_weight_counts_once_whatever_other_goals_require_of_its_object(
     goals: tuple[str, ...], unmet: list[Fraction], tmp_path: Path

@@ -8,6 +8,7 @@ import confab
 from confab import ontology
 from confab.planner.plan import Status
 from confab.planner.validation import validate
+from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.symbols import TRUE, Symbol
 
 SCENE = (ontology.ROOT / "scenes" / "carts-small.ttl").read_text("utf-8")
@@ -74,3 +75,26 @@ def test_a_domain_may_have_a_class_of_tasks_beside_a_compound_goal(tmp_path: Pat
     assert len(result.plan.primitives) == GOALS["none"][1]
     assert {row.object for row in loaded.affordances()} == {"books", "glass", "paper", "cart"}
     assert loaded.query("SELECT ?crate WHERE { ?crate a d:Task ; d:in :store }")
+
+
+@pytest.mark.parametrize(
+    ("said", "fault"),
+    [
+        ("", "used as a condition but isn't declared"),
+        ("a c:ValueCondition ; c:about :books ; c:situationType d:IN", "states no value"),
+        (
+            "a c:ValueCondition ; c:about :books ; c:situationType d:IN ; c:value :shop, :store",
+            "wanted one c:value, found 2",
+        ),
+        (
+            "a c:ValueCondition ; c:about :books, :glass ; c:situationType d:IN ; c:value :shop",
+            "wanted one c:about, found 2",
+        ),
+    ],
+)
+def test_a_goal_that_lacks_or_repeats_a_part_is_refused_by_name(said: str, fault: str, tmp_path: Path) -> None:
+    head, rest = SCENE[: SCENE.index("  c:goal ")], SCENE[SCENE.index(" .\n", SCENE.index("  c:goal ")) :]
+    goal = f"\n:order.wrong {said} ." if said else ""
+    (tmp_path / "scene.ttl").write_text(f"{head}  c:goal :order.wrong{rest}{goal}\n", "utf-8")
+    with pytest.raises(KnowledgeError, match=fault):
+        confab.load(tmp_path / "scene.ttl").plan()
