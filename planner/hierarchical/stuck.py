@@ -9,7 +9,7 @@ from confab.planner.hierarchical.call import Call
 from confab.planner.hierarchical.relevance import Asked, relevant_achievers
 from confab.planner.plan import Limits, Reason
 from confab.planner.transitions import Cell, arguments_of
-from confab.reasoner.amounts import bounds_written
+from confab.reasoner.amounts import bounds_written, meets
 from confab.reasoner.limits import LimitError
 from confab.reasoner.symbols import Fact, Symbol
 
@@ -58,7 +58,7 @@ def missing_amounts(call: Call) -> Iterator[str]:
             {
                 (name, key): wanted
                 for name, key, wanted in sorted(asked, key=str)
-                if situations[name].quantity is not None
+                if situations[name].quantity is not None and not meets(call.table.now[name].get(key), wanted)
             }
         )
     for (name, key), wanted in list(told.items())[:AMOUNTS]:
