@@ -20,7 +20,7 @@ from confab.planner.acting.symbolic_world import SymbolicWorld, with_individual
 from confab.planner.acting.world import World
 from confab.planner.plan import Plan, Planner, SoftGoal
 from confab.planner.solve import DEFAULT_MODE, Mode
-from confab.planner.validation import open_goals
+from confab.planner.validation import open_goals, unmet_goals
 from confab.reasoner.aggregates.totals import exceptions
 from confab.reasoner.amounts import written
 from confab.reasoner.graph.knowledge import KnowledgeError
@@ -226,6 +226,8 @@ def carry_out(
     problem = _whole_problem(scene, plan, several(goals))
     check_goal(scene.iri, problem)
     begun = None if plan is None else plan_of(plan, problem)
+    if begun is not None and problem.weights:  # the plan determines the soft goals to reach
+        problem = problem.only(problem.weights.keys() & unmet_goals(problem, begun))
     if isinstance(memory, str | Path):
         from confab.memory import Memory
 

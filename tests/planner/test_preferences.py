@@ -203,9 +203,12 @@ def test_each_goal_with_a_weight_counts_once_whatever_other_goals_require_of_its
         assert not result.faults(result.plan)
 
 
-def test_execution_leaves_the_same_goals_unmet() -> None:
+@pytest.mark.parametrize("given", ["nothing", "a result", "a plan", "a file"])
+def test_execution_leaves_the_same_goals_unmet(given: str, tmp_path: Path) -> None:
     scene = confab.load("wishes-small")
-    done = scene.execute()
+    result = scene.plan()
+    plans = {"nothing": None, "a result": result, "a plan": result.plan, "a file": result.save(tmp_path / "plan.json")}
+    done = scene.execute(plans[given])
     assert done.reached
     assert len(done.episode.events) == len(scene.plan().plan.primitives)
     assert [(str(goal.fact), goal.met) for goal in done.soft_goals] == [
