@@ -352,6 +352,8 @@ class Result(metaclass=RightNames):
         words = " ".join(several(str(asked) if isinstance(asked, Step) else asked)).split()
         if words[:1] and words[0].isdecimal():  # the text of a step begins with its ID
             words = words[1:]
+        if "+" in words:  # the text of steps that are refined together; the question is about the first
+            words = words[: words.index("+")]
         if not words:
             raise KnowledgeError("the alternative is empty; wanted a goal, or a behaviour with individuals")
         asked = " ".join(words)

@@ -336,3 +336,10 @@ def test_a_negative_number_counts_steps_from_the_end(serving: confab.Result) -> 
 def test_steps_refined_together_with_the_same_label_are_named_once(serving: confab.Result) -> None:
     step = serving.plan[0]
     assert serving.labels.step(replace(step, joined=(step,))) == serving.labels.step(step)
+
+
+def test_the_text_of_steps_that_are_refined_together_is_a_question_about_the_first() -> None:
+    result = confab.load("library-small").plan()
+    joined = next(step for step in result.plan.steps if step.joined)
+    assert "the plan already has this step" in str(result.why_not(joined))
+    assert str(result.why_not(str(joined))) == str(result.why_not(joined))
