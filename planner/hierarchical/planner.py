@@ -26,6 +26,7 @@ from confab.planner.hierarchical.agenda import Agenda
 from confab.planner.hierarchical.call import Call, Compiled, compiled
 from confab.planner.hierarchical.scope import BITS
 from confab.planner.hierarchical.shortening import ORDERS, shortened
+from confab.planner.hierarchical.unsolvability import FINALLY
 from confab.planner.hierarchical.windows import as_refined, regroupings
 from confab.planner.plan import Limits, Outcome, Reason, Status, UnsolvableError, paused_collection
 from confab.planner.transitions import arguments_of
@@ -141,6 +142,7 @@ def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool) -> Outcome:
     """Search the lowest level as a whole; give up if `leave_levels` is false, or if the level is too large."""
     call, problem = agenda.call, agenda.call.problem
     *upper, lowest = call.program.levels
+    agenda.proofs.certify(growth=FINALLY)
     if upper and not leave_levels:
         return given_up(call, f"no plan of level {upper[0]} was found that can be refined, and {NOT_LEFT}")
     if upper:

@@ -31,6 +31,8 @@ The first limit holds before a search, the second in the paper's mode, and the t
 """
 TEST = 8
 """Work of testing one condition, in the unit of `Workspace.effort`."""
+REPEATED, FINALLY = 4, 2
+"""Factors by which the limit of tests must have grown before a certificate is searched again: during planning, and at its end."""
 FEW = 1_000
 """The lowest level is examined when the searches have cost as much as examining this number of its states."""
 MOST_ROWS, MOST_CHANGES = 2_000_000, 10_000_000
@@ -69,14 +71,15 @@ class Proofs:
         if space.effort >= FEW * program.size(program.levels[-1]):
             self.examine()
 
-    def certify(self, ahead: int = 0) -> None:
+    def certify(self, ahead: int = 0, growth: int = REPEATED) -> None:
         """Search for a certificate, and raise `UnsolvableError` if a certificate is found.
 
-        The search is repeated each time that the effort has doubled, up to a limit. `ahead` is the work of the next search.
+        The search is repeated each time that the effort has grown by the factor `growth`, up to a limit. `ahead` is the work of the
+        next search.
         """
         space = self.call.space
         tests = max(FIRST_TESTS, min(max(space.effort, ahead) // TEST, PAIRS))
-        if self._tests < tests >= min(2 * self._tests, PAIRS) and self._may_succeed():
+        if self._tests < tests >= min(growth * self._tests, PAIRS) and self._may_succeed():
             self._tests = tests
             if proof := impossible(self.call.problem, tests, space.deadline):
                 raise proof
