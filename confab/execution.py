@@ -346,7 +346,7 @@ def execute(
                 "interventions can take place in simulated worlds only, which have disturb and announce"
             )
         with possible():
-            return Execution(scene, act(problem, world, plan, wanted, planner, retry_policy, observer, True, caution))
+            return Execution(scene, act(problem, world, plan, wanted, planner, retry_policy, observer, caution))
     if world != "pybullet":
         raise KnowledgeError(
             f"unknown world '{world}'; wanted {', '.join(WORLDS)}, or a robot like pyrobosim:world.yaml"
@@ -366,7 +366,7 @@ def execute(
         for intervention in wanted:
             if (why := live.impossible(intervention)) is not None:
                 raise KnowledgeError(f"'{intervention.text}' can't happen in PyBullet: {why}")
-        episode = act(problem, live, plan, wanted, planner, retry_policy, observer, True, caution, both_hands)
+        episode = act(problem, live, plan, wanted, planner, retry_policy, observer, caution, both_hands)
         return Execution(scene, episode)
 
 

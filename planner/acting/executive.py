@@ -54,7 +54,6 @@ def act(
     planner: Planner | None = None,
     retry_policy: RetryPolicy = DEFAULT,
     observer: Callable[[Event], None] | None = None,
-    repairs: bool = True,
     caution: Caution | None = None,
     together: bool = False,
 ) -> Episode:
@@ -75,8 +74,6 @@ def act(
     retry_policy : RetryPolicy
     observer : callable, optional
         Function that is called with every `Event`.
-    repairs : bool
-        If false, the executive plans from scratch instead of repairing the plan.
     caution : Caution, optional
         Failures in earlier episodes; unreliable facts and behaviours are avoided if there is an alternative.
     together : bool
@@ -91,7 +88,6 @@ def act(
         planner,
         Retries(retry_policy),
         observer,
-        repairs,
         together,
     )
     try:
@@ -131,7 +127,6 @@ class _RunningEpisode:
     planner: Planner | None
     retries: Retries
     observer: Callable[[Event], None] | None
-    repairs: bool
     together: bool
     going: bool = True
     goals: Postponed = field(default_factory=Postponed)
@@ -405,29 +400,26 @@ class _RunningEpisode:
         begin = perf_counter()
         limits, old = self.retries.policy.planning, self.agenda.steps
         end = limits.end()
-        if self.repairs:
-            expected = {s: v for s, v in {**belief.state, **self.missed}.items() if v is not None}
-            planned = replace(self.agenda.planned_for, initial=expected)
-            begun = bool(old) and old[0].path in self.agenda.begun
-            repaired = repair_or_replan(
-                belief.task, old, planned, self.planner, belief.using, self.agenda.sound, limits, begun
-            )
-            kind, steps, cost, outcome = repaired.kind, repaired.steps, repaired.cost, repaired.outcome
-        else:
-            steps, outcome = replan(belief.task, self.planner, belief.using, limits)
-            kind, cost = "replan", float(len(Plan(steps or ()).primitives))
+        expected = {s: v for s, v in {**belief.state, **self.missed}.items() if v is not None}
+        planned = replace(self.agenda.planned_for, initial=expected)
+        begun = bool(old) and old[0].path in self.agenda.begun
+        found = repair_or_replan(
+            belief.task, old, planned, self.planner, belief.using, self.agenda.sound, limits, begun
+        )
+        steps = found.steps
         seconds = perf_counter() - begin
         record.seconds["repairing"] += seconds
         self.agenda.planned_for, self.agenda.sound, self.missed = belief.task, True, {}
         if steps is None:
-            self.on_no_plan(outcome, limits.until(end))
+            self.on_no_plan(found.outcome, limits.until(end))
             return
         self.agenda.steps = self.agenda.numbered(steps, record.done)
         dropped, added = difference(old, steps)
         if dropped or added:
             last = record.events[-1].step.path if record.events else ()
-            record.replans.append(Replan(last, kind, why, self.agenda.steps, cost, dropped, added, seconds))
-            self.say(kind, text=why)
+            change = Replan(last, found.kind, why, self.agenda.steps, found.cost, dropped, added, seconds)
+            record.replans.append(change)
+            self.say(found.kind, text=why)
 
     def set_aside(self, impossible: Mapping[Symbol, Reason]) -> None:
         """Drop an impossible goal, and record the reason."""

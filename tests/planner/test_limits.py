@@ -39,8 +39,9 @@ def test_an_episode_ends_when_a_goal_that_follows_from_rules_holds(name: str) ->
 def test_an_episode_in_which_planning_changes_nothing_gives_up(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = confab.load(CASES / "endless-h2.ttl").problem
     nothing = (), Outcome(Status.SOLVED, Plan(()))
-    monkeypatch.setattr(executive, "replan", lambda *_: nothing)
-    episode = executive.act(problem, SymbolicWorld(problem), Plan(()), repairs=False)
+    monkeypatch.setattr("confab.planner.acting.repair.repair", lambda *_: None)
+    monkeypatch.setattr("confab.planner.acting.repair.replan", lambda *_: nothing)
+    episode = executive.act(problem, SymbolicWorld(problem), Plan(()))
     assert episode.status.value == "gave-up"
     assert "planned 3 times in the same situation" in episode.reasons[0].text
 
