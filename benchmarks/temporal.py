@@ -32,15 +32,23 @@ EPSILON = Fraction(1, 1000)
 FIRST, COUNT = 20_000, 5_000
 TABLES = ("served", "swap", "handover", "blocked")
 PEER = """
-import json, sys
-from unified_planning.io import PDDLReader
-from unified_planning.shortcuts import OneshotPlanner, get_environment
-get_environment().credits_stream = None
-get_environment().error_used_name = False
-problem = PDDLReader().parse_problem(sys.argv[2], sys.argv[3])
-with OneshotPlanner(name=sys.argv[1]) as planner:
-    plan = planner.solve(problem).plan
-ends = [] if plan is None else [float(begin + (lasts or 0)) for begin, _, lasts in plan.timed_actions]
+import json, re, subprocess, sys, tempfile
+name, domain, problem = sys.argv[1:]
+if name == "lpg":  # the engine's program: unified-planning can't read all of its plans
+    from up_lpg.lpg_planner import lpg_os
+    from importlib.resources import files
+    with tempfile.TemporaryDirectory() as folder:
+        command = [files("up_lpg") / lpg_os[sys.platform], "-o", domain, "-f", problem, "-n", "1", "-out", folder + "/plan"]
+        said = subprocess.run(command, capture_output=True, text=True).stdout
+    ends = [float(end) for end in re.findall(r"^Duration: +([0-9.]+)", said, re.MULTILINE)]
+else:
+    from unified_planning.io import PDDLReader
+    from unified_planning.shortcuts import OneshotPlanner, get_environment
+    get_environment().credits_stream = None
+    get_environment().error_used_name = False
+    with OneshotPlanner(name=name) as planner:
+        plan = planner.solve(PDDLReader().parse_problem(domain, problem)).plan
+    ends = [] if plan is None else [float(begin + (lasts or 0)) for begin, _, lasts in plan.timed_actions]
 print(json.dumps(max(ends) if ends else None))
 """
 

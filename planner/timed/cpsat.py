@@ -47,6 +47,8 @@ def shorter(
     solver.parameters.max_deterministic_time = WORK
     solver.parameters.num_workers = 1
     solver.parameters.random_seed = 0
+    solver.parameters.use_strong_propagation_in_disjunctive = True
+    solver.parameters.linearization_level = 0  # linear relaxations of disjunctive turns are slow and weak
     made = _ScheduleModel(model, order, network, choices, found, bound)
     status = solver.Solve(model)
     best = max(bound, round(solver.BestObjectiveBound()))

@@ -128,6 +128,13 @@ def order_of(problem: Problem, activities: Sequence[Activity], events: Iterable[
         for turn in resource.turns if resource.actor is not None else ():
             its = [m for m in turn.members if resource.actor in activities[m].actors]
             edges.update(dict.fromkeys((one, END, other, BEGIN) for one, other in pairwise(its)))
+    alike: dict[tuple[str, tuple[str, ...]], int] = {}
+    for number in sorted(starts, key=starts.__getitem__):
+        one = activities[number]
+        if not one.actors:  # no step overlaps with itself
+            if (before := alike.get((one.step.behavior, one.step.arguments))) is not None:
+                edges[before, END, number, BEGIN] = None
+            alike[one.step.behavior, one.step.arguments] = number
     return Order(
         tuple(activities),
         tuple(edges),

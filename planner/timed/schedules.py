@@ -7,6 +7,7 @@ Management Science 42, 1996). If OR-Tools is installed, CP-SAT improves the resu
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -21,6 +22,8 @@ ROUNDS = 100
 """Maximum number of exchanges of turns without a better schedule."""
 MOST_ARCS = 400_000
 """Maximum number of arcs that exchanges of turns process."""
+MOST_UNIONS = 300
+"""Maximum number of sets of exchangeable actors whose work gives a lower bound."""
 TABU = 8
 """Number of further exchanges during which the search doesn't undo an exchange."""
 
@@ -271,8 +274,8 @@ class _ScheduleSearch:
 def least(order: Order, network: Network, choices: ActorChoices) -> int:
     """Return a lower bound on the makespan of any schedule of the activities with any possible actors.
 
-    The bound is the greater of two numbers: the longest chain of precedences, and the work of exchangeable actors divided by the
-    number of these actors.
+    The bound is the greater of two numbers: the longest chain of precedences, and the work that only some actors can do divided by
+    the number of these actors.
     """
     lasts = list(network.durations)
     for its in choices.lasts.values():
@@ -284,15 +287,15 @@ def least(order: Order, network: Network, choices: ActorChoices) -> int:
     free = replace(network, edges=edges, tick=network.separation, latest=[()] * len(lasts))
     chain = earliest(free, (), lasts)
     bound = chain.makespan if chain is not None else 0
-    groups: dict[tuple[int, ...], list[TurnId]] = {}
+    work: dict[frozenset[int], int] = defaultdict(int)
     for resource, one in enumerate(order.resources):
         for number in range(len(one.turns)):
-            able = tuple(sorted(choices.of.get((resource, number), (resource,))))
-            groups.setdefault(able, []).append((resource, number))
-    for able in groups:
-        inside = [turn for other, turns in groups.items() if set(other) <= set(able) for turn in turns]
-        work = sum(_work(order, lasts, turn) for turn in inside)
-        bound = max(bound, -(-work // len(able)))
+            work[frozenset(choices.of.get((resource, number), (resource,)))] += _work(order, lasts, (resource, number))
+    unions = list(work)
+    for able in unions:  # the loop appends unions to the list
+        bound = max(bound, -(-sum(its for other, its in work.items() if other <= able) // len(able)))
+        more = dict.fromkeys(able | other for other in work if len(able) > 1 < len(other) and able & other)
+        unions += [one for one in more if one not in unions][: max(MOST_UNIONS - len(unions), 0)]
     return bound
 
 

@@ -148,15 +148,15 @@ class _TimedExecution:
         return self.pieces[name]
 
     def actors(self) -> Iterator[Fault]:
-        """Yield a fault if an actor is in two steps at the same time, or if an individual of a step isn't available."""
+        """Yield the actors in two steps at once, the steps that overlap with themselves, and the unavailable individuals."""
         lanes: dict[str, list[Slot]] = {}
         for slot in self.timed.slots:
             behavior = self.problem.domain.behaviors[slot.step.behavior]
             fixed = self.piece(behavior.name).fixed
             terms = (*slot.step.arguments, *(slot.step.bindings.get(v.name[1:], v.name) for v in fixed))
             its = actors_of(self.problem, behavior, terms, self.resting)
-            for actor in its:
-                lanes.setdefault(actor, []).append(slot)
+            for one in its or (str(slot.step),):
+                lanes.setdefault(one, []).append(slot)
             for one in dict.fromkeys((*slot.step.arguments, *its)):
                 windows = self.times.windows.get(one)
                 if windows is not None and not any(

@@ -10,7 +10,7 @@ import pytest
 import confab
 from confab.memory import Memory
 from confab.planner.hierarchical.planner import plan
-from confab.planner.plan import Limits, Outcome, Reason, Status
+from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, Step
 from confab.planner.solve import Request, solve
 from confab.planner.timed import concurrent
 from confab.planner.timed.bounds import of_any_plan
@@ -241,6 +241,18 @@ def test_a_deadline_bounds_the_begin_of_a_step_that_achieves_its_goal_at_the_sta
     _, timed = planned(problem_of(world))
     assert timed is not None
     assert timed.plan is not None
+
+
+def test_a_step_without_an_actor_does_not_overlap_with_itself() -> None:
+    action = Action(2, None, (), (("end", (0, True)),))
+    problem = problem_of(TimedWorld(1, (action,), frozenset(), ((0, True),)))
+    twice = Plan(tuple(Step((number,), 0, 1, "A0", ()) for number in range(2)))
+    timed = in_time(problem, twice).plan
+    assert timed is not None
+    assert timed.makespan == 4
+    slots = timed.slots[0], replace(timed.slots[1], begin=Fraction(1), end=Fraction(3))
+    assert any("is in 0 A0" in fault.text for fault in validate_timed(problem, replace(timed, slots=slots)))
+    assert wrong(timed_world(731_004_837, limited=True)) is None
 
 
 def test_a_schedule_without_remaining_time_is_given_up_and_named() -> None:
