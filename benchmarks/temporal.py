@@ -25,7 +25,7 @@ from fractions import Fraction
 from pathlib import Path
 from time import process_time
 
-SECONDS = 30
+SECONDS, VALIDATING = 30, 5
 ROOT = Path(__file__).resolve().parents[1]
 PROBLEMS = Path(os.environ.get("CONFAB_TEMPORAL", ROOT.parent / "shared" / "temporal"))
 EPSILON = Fraction(1, 1000)
@@ -162,7 +162,7 @@ def one(domain: Path, problem: Path) -> None:
     from confab.planner.plan import Limits
     from confab.planner.solve import Request, solve
     from confab.planner.timed import concurrent
-    from confab.planner.timed.call import in_time
+    from confab.planner.timed.call import best_in_time
     from confab.reasoner.pddl.importing import imported
     from confab.reasoner.pddl.syntax import parse_files
     from confab.reasoner.timing import only_during
@@ -172,7 +172,8 @@ def one(domain: Path, problem: Path) -> None:
         timed = concurrent.plan(found.problem, Limits(), EPSILON)[1].plan
     else:
         plan = solve(Request(found.problem)).plan
-        timed = None if plan is None else in_time(found.problem, plan, 3.0, EPSILON).plan
+        left = max(SECONDS - VALIDATING - process_time(), 1.0)
+        timed = None if plan is None else best_in_time(found.problem, plan, left, separation=EPSILON).plan
     if timed is None:
         print("null")
         return

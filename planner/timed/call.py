@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from importlib.util import find_spec
+from math import inf
 from time import perf_counter
 
 import networkx
@@ -30,9 +31,6 @@ from confab.planner.validation import Cell, validate
 from confab.reasoner.limits import LimitError
 from confab.reasoner.symbols import Fact, Problem, Times
 
-SECONDS = 10.0
-"""Default time limit of scheduling, in seconds; the search that exchanges turns of actors also has a limit of work."""
-
 
 @dataclass(frozen=True)
 class Timed:
@@ -46,7 +44,13 @@ class Timed:
     late: Fraction = Fraction(0)
 
 
-def best_in_time(problem: Problem, plan: Plan, seconds: float | None = None, shorten: bool = True) -> Timed:
+def best_in_time(
+    problem: Problem,
+    plan: Plan,
+    seconds: float | None = None,
+    shorten: bool = True,
+    separation: Fraction = Fraction(0),
+) -> Timed:
     """Return a timed plan for the goals of a plan.
 
     The timed plan may have other steps than the given plan, other actors, and another order.
@@ -60,8 +64,10 @@ def best_in_time(problem: Problem, plan: Plan, seconds: float | None = None, sho
         Time limit of the search for a short schedule.
     shorten : bool
         Whether to search for a short schedule; otherwise return the first schedule that keeps all time windows and deadlines.
+    separation : Fraction
+        The minimum time between conflicting events, in seconds (epsilon in PDDL).
     """
-    found = _best(problem, plan, seconds, shorten)
+    found = _best(problem, plan, seconds, shorten, separation)
     if found.plan is None or not shorten:
         return found
     from confab.planner.timed.bounds import of_any_plan
@@ -70,7 +76,7 @@ def best_in_time(problem: Problem, plan: Plan, seconds: float | None = None, sho
     return replace(found, plan=replace(found.plan, least=least, bound=max(found.plan.bound, least)))
 
 
-def _best(problem: Problem, plan: Plan, seconds: float | None, shorten: bool) -> Timed:
+def _best(problem: Problem, plan: Plan, seconds: float | None, shorten: bool, separation: Fraction) -> Timed:
     from confab.planner.timed.sharing import evenly_shared, shared
 
     until = None if seconds is None else perf_counter() + seconds
@@ -82,11 +88,11 @@ def _best(problem: Problem, plan: Plan, seconds: float | None, shorten: bool) ->
         return one.plan is not None and (not shorten or evenly_shared(problem, one.plan.work, one.plan.makespan))
 
     try:
-        first = in_time(problem, plan, left(4))
+        first = in_time(problem, plan, left(4), separation)
     except LimitError as limit:
         return Timed(reason=Reason(str(limit)))
     if shorten:
-        first = _spread(problem, plan, first, left(3))
+        first = _spread(problem, plan, first, left(3), separation)
     if enough(first):
         return first
     half = left(2)
@@ -95,17 +101,17 @@ def _best(problem: Problem, plan: Plan, seconds: float | None, shorten: bool) ->
         return first
     found = first
     with suppress(LimitError):
-        found = _better(first, in_time(problem, other, left(2)))
-    return _spread(problem, other, found, left(1)) if shorten else found
+        found = _better(first, in_time(problem, other, left(2), separation))
+    return _spread(problem, other, found, left(1), separation) if shorten else found
 
 
-def _spread(problem: Problem, plan: Plan, known: Timed, seconds: float | None) -> Timed:
+def _spread(problem: Problem, plan: Plan, known: Timed, seconds: float | None, separation: Fraction) -> Timed:
     """Return a result with the turns of a plan spread over equal values if it is better than a known result, else the known one."""
     from confab.planner.timed.spreading import spread
 
     with suppress(LimitError):
         several = spread(problem, plan)
-        return known if several is plan else _better(known, in_time(problem, several, seconds))
+        return known if several is plan else _better(known, in_time(problem, several, seconds, separation))
     return known
 
 
@@ -131,13 +137,13 @@ def in_time(
     plan : Plan
         A plan of the problem.
     seconds : float, optional
-        Time limit of the search for a short schedule.
+        Time limit of the search for a short schedule; the search also has a limit of work.
     separation : Fraction
         The minimum time between conflicting events, in seconds (epsilon in PDDL).
     events : sequence of StepEvent, optional
         The order of the begins and ends of the primitives; by default the primitives are executed one after another.
     """
-    until = perf_counter() + (SECONDS if seconds is None else seconds)
+    until = inf if seconds is None else perf_counter() + seconds
     steps = plan.primitives
     its_events = list(in_sequence(steps)) if events is None else list(events)
     try:

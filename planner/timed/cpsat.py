@@ -43,7 +43,7 @@ def shorter(
 
     model: Any = cp_model.CpModel()
     solver: Any = cp_model.CpSolver()
-    solver.parameters.max_time_in_seconds = seconds
+    solver.parameters.max_time_in_seconds = min(seconds, solver.parameters.max_time_in_seconds)
     solver.parameters.max_deterministic_time = WORK
     solver.parameters.num_workers = 1
     solver.parameters.random_seed = 0
