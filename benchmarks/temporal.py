@@ -21,6 +21,7 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
 from time import process_time
@@ -144,9 +145,16 @@ def _run(planner: str, domain: Path, problem: Path) -> dict[str, float | bool] |
     def limited() -> None:
         resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 1))
 
-    done = subprocess.run(
-        command, cwd=ROOT, capture_output=True, text=True, preexec_fn=limited, timeout=SECONDS * 20, check=False
-    )
+    with suppress(subprocess.TimeoutExpired):
+        done = subprocess.run(
+            command, cwd=ROOT, capture_output=True, text=True, preexec_fn=limited, timeout=SECONDS * 20, check=False
+        )
+        return _said(done)
+    return None
+
+
+def _said(done: subprocess.CompletedProcess[str]) -> dict[str, float | bool] | None:
+    """Return the makespan and the verdict that a finished process has printed, or None if it has printed none."""
     lines = done.stdout.splitlines()
     if not lines or done.returncode < 0:
         return None

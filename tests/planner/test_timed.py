@@ -39,7 +39,7 @@ from confab.reasoner.symbols import (
 )
 from confab.reasoner.timing import only_during
 from confab.timing import scheduled
-from worlds.families import family
+from worlds.families import family, table
 from worlds.timed import Action, TimedWorld, least_makespan, problem_of, rejected, timed_world
 
 
@@ -60,6 +60,17 @@ def served() -> TimedPlan:
 def test_two_hands_share_the_work_in_half_the_time_and_that_is_proved() -> None:
     assert [served().serial, served().makespan, served().bound] == [Fraction(32), Fraction(16), Fraction(16)]
     assert [name for name, _ in served().lanes()] == ["left_hand", "right_hand"]
+
+
+def test_the_work_that_overlapping_groups_of_hands_share_bounds_the_makespan() -> None:
+    left, right = {1, 2, 3, 7, 8, 9}, {4, 5, 6, 10, 11, 12}
+    goals = {f"cup{i}": 6 + i for i in range(1, 7)}
+    problem = table(12, 3, 6, 0, range(1, 7), goals, {}, [left, left | right, right])
+    found = plan(problem).plan
+    assert found is not None
+    timed = in_time(problem, found).plan
+    assert timed is not None
+    assert (timed.makespan, timed.bound, timed.scheduler) == (12, 12, "exchanges")
 
 
 def test_hands_pass_cups_in_both_directions_without_waiting_for_places() -> None:
