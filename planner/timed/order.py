@@ -130,11 +130,11 @@ def order_of(problem: Problem, activities: Sequence[Activity], events: Iterable[
             edges.update(dict.fromkeys((one, END, other, BEGIN) for one, other in pairwise(its)))
     alike: dict[tuple[str, tuple[str, ...]], int] = {}
     for number in sorted(starts, key=starts.__getitem__):
-        one = activities[number]
-        if not one.actors:  # no step overlaps with itself
-            if (before := alike.get((one.step.behavior, one.step.arguments))) is not None:
-                edges[before, END, number, BEGIN] = None
-            alike[one.step.behavior, one.step.arguments] = number
+        its_step = activities[number].step.behavior, activities[number].step.arguments
+        if not activities[number].actors:  # no step overlaps with itself
+            if its_step in alike:
+                edges[alike[its_step], END, number, BEGIN] = None
+            alike[its_step] = number
     return Order(
         tuple(activities),
         tuple(edges),
