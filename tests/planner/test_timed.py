@@ -70,7 +70,8 @@ def test_the_work_that_overlapping_groups_of_hands_share_bounds_the_makespan() -
     assert found is not None
     timed = in_time(problem, found).plan
     assert timed is not None
-    assert (timed.makespan, timed.bound, timed.scheduler) == (12, 12, "exchanges")
+    assert timed.makespan == timed.bound == 12
+    assert timed.scheduler == "exchanges"
 
 
 def test_hands_pass_cups_in_both_directions_without_waiting_for_places() -> None:
