@@ -251,6 +251,10 @@ class _Finder:
     separation: Fraction
     deadline: float | None
     counts: Counts = field(default_factory=Counts)
+    accesses: dict[int, tuple[int, int]] = field(default_factory=dict)
+    """The stored results of `access`, by operator."""
+    places: dict[tuple[str, tuple[str, ...]], int] = field(default_factory=dict)
+    """The bit of each symbol that an operator reads or sets."""
 
     def __post_init__(self) -> None:
         self.named = [self.task.describe(operator)[:2] for operator in range(len(self.task))]
@@ -435,28 +439,10 @@ class _Finder:
             found |= 1 << self.places.setdefault(cell, len(self.places))
         return found
 
-    @cached_property
-    def accesses(self) -> dict[int, tuple[int, int]]:
-        """The stored results of `access`, by operator."""
-        return {}
-
-    @cached_property
-    def places(self) -> dict[tuple[str, tuple[str, ...]], int]:
-        """The bit of each symbol that an operator reads or sets."""
-        return {}
-
     def held(self, end: int) -> int:
         """Return the bits that the end of a running step requires, or 0 if the behaviour has separate conditions at its end."""
-        if end not in self._held:
-            whole = self.cut.whole.domain.behaviors[self.named[end][0].partition("@")[0]]
-            asked = self.task.changes_of(end)[0]
-            its = timing_of(whole).asked(Span.END)
-            self._held[end] = 0 if its else asked
-        return self._held[end]
-
-    @cached_property
-    def _held(self) -> dict[int, int]:
-        return {}
+        whole = self.cut.whole.domain.behaviors[self.named[end][0].partition("@")[0]]
+        return 0 if timing_of(whole).asked(Span.END) else self.task.changes_of(end)[0]
 
     def times(self, node: _SearchNode, ending: Mapping[int, int]) -> list[int] | None:
         """Return the earliest begin of each step of a node, given that the running steps in `ending` are the next to end.

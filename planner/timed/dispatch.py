@@ -75,9 +75,7 @@ class Dispatch:
         steps, events = timed.plan.primitives, list(_events(timed))
         self.order = order_of(problem, activities(problem, steps, events), events)
         self.network = network_of(self.order, more=(UNIT,))
-        self.turns: list[list[TurnId]] = [
-            [(r, t) for t in range(len(one.turns))] for r, one in enumerate(self.order.resources)
-        ]
+        self.turns = self.order.turns
         every = [*self.network.edges, *turn_edges(self.order, self.turns)]
         self.controlled = all(low == BEGIN for *_, low in every)
         self.choices = choices_of(problem, timed.plan, self.order, self.network) if self.controlled else ActorChoices()

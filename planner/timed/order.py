@@ -76,6 +76,11 @@ class Order:
     latest: Mapping[tuple[int, int], Fraction] = field(default_factory=dict)
     windows: Mapping[int, tuple[tuple[Fraction, Fraction | None], ...]] = field(default_factory=dict)
 
+    @property
+    def turns(self) -> list[list[TurnId]]:
+        """The turns of each resource, in the order of the sequence."""
+        return [[(r, t) for t in range(len(one.turns))] for r, one in enumerate(self.resources)]
+
 
 @dataclass(frozen=True)
 class _TimedAccess:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from itertools import chain, pairwise
 from math import inf
 from time import perf_counter
 
@@ -175,7 +175,7 @@ class _ScheduleSearch:
 
     def starts(self) -> Iterator[list[list[TurnId]]]:
         """Yield the orders of turns that lead to the first schedules: the order of the sequence, and list scheduling."""
-        yield [[(r, t) for t in range(len(one.turns))] for r, one in enumerate(self.order.resources)]
+        yield self.order.turns
         listed = Listing(self.order, self.network, self.choices.of, self.choices.lasts).turns()
         if listed is not None:
             yield listed
@@ -285,12 +285,11 @@ def least(order: Order, network: Network, choices: ActorChoices) -> int:
     if lasts != network.durations:  # a shorter activity could begin later and still end in order
         edges = tuple(edge for edge in edges if edge[3] == BEGIN)
     free = replace(network, edges=edges, tick=network.separation, latest=[()] * len(lasts))
-    chain = earliest(free, (), lasts)
-    bound = chain.makespan if chain is not None else 0
+    begins = earliest(free, (), lasts)
+    bound = begins.makespan if begins is not None else 0
     work: dict[frozenset[int], int] = defaultdict(int)
-    for resource, one in enumerate(order.resources):
-        for number in range(len(one.turns)):
-            work[frozenset(choices.of.get((resource, number), (resource,)))] += _work(order, lasts, (resource, number))
+    for turn in chain.from_iterable(order.turns):
+        work[frozenset(choices.of.get(turn, turn[:1]))] += _work(order, lasts, turn)
     unions = list(work)
     for able in unions:  # the loop appends unions to the list
         bound = max(bound, -(-sum(its for other, its in work.items() if other <= able) // len(able)))

@@ -469,8 +469,7 @@ class _SharingSearch:
         except InapplicableError:
             return None
         network = network_of(order)
-        own = [[(r, t) for t in range(len(one.turns))] for r, one in enumerate(order.resources)]
-        begins = earliest(network, turn_edges(order, own))
+        begins = earliest(network, turn_edges(order, order.turns))
         if begins is None:
             return None
         if not steps:
