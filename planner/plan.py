@@ -339,7 +339,7 @@ class Forgone:
 
     def __str__(self) -> str:
         more = (
-            "no plan that meets it was found"
+            "no plan that meets it and the other goals was found"
             if self.price is None
             else f"it would cost at most {written(self.price)} more"
         )
