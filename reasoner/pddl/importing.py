@@ -131,7 +131,9 @@ class _Import:
     scene: str
     level: int
     names: dict[tuple[str, str], str] = field(default_factory=dict)  # the problem's name, by kind and PDDL name
-    taken: set[str] = field(default_factory=lambda: {TRUE, FALSE, "Truth", "Object", "Hand", "Robot", WORLD, THE_WORLD})
+    taken: set[str] = field(
+        default_factory=lambda: {TRUE, FALSE, "Truth", "Object", "Hand", "Robot", "task", WORLD, THE_WORLD}
+    )
     places: dict[str, PredicateTranslation] = field(default_factory=dict)
     variables: dict[str, str] = field(default_factory=dict)  # the PDDL name, by the problem's name
 

@@ -330,13 +330,21 @@ class _SceneWriter:
 
         A fact is written as a statement of a value property if the property exists, and as a node otherwise.
         """
-        number = 0
+        number, fact = 0, self.unlike_others("fact")
         for subject, prop, value, properties in (*self.values(), *self.tuples()):
             if prop:
                 yield f"{self.iri(subject)} {prop} {value} ."
                 continue
             number += 1
-            yield f"{self.individual.statement(f':fact{number}', 'SituatedObjectInstance', properties)} ."
+            yield f"{self.individual.statement(f':{fact}{number}', 'SituatedObjectInstance', properties)} ."
+
+    def unlike_others(self, word: str) -> str:
+        """Return a word with underscores at its end such that no name of the problem is this word with a number."""
+        domain = self.problem.domain
+        names = {*self.problem.individuals, *self.problem.classes, *domain.situations, *domain.behaviors}
+        while any(name.removeprefix(word).isdecimal() for name in names if name.startswith(word)):
+            word += "_"
+        return word
 
     def values(self) -> Iterator[_TurtleFact]:
         """Yield the initial values of symbols, except default values and rest values."""
@@ -374,7 +382,7 @@ class _SceneWriter:
 
     def task(self) -> Iterator[str]:
         goals = [Fact(symbol, part) for symbol, value in self.problem.goal.items() for part in value.split(",")]
-        iris = [f":goal{i}" for i in range(1, len(goals) + 1)]
+        iris = [f":{self.unlike_others('goal')}{i}" for i in range(1, len(goals) + 1)]
         goal = f" ; c:goal {', '.join(iris)}" if iris else ""
         yield f':task a owl:NamedIndividual, c:Task ; rdfs:label "task"@en{goal} .'
         for iri, fact in zip(iris, goals, strict=True):

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+import confab
 from confab.pddl_commands import export_pddl, import_pddl, read_pddl_plan
 from confab.planner.grounded.best_first import plan_level, search
 from confab.planner.grounded.grounding import ground
@@ -371,3 +372,19 @@ def test_a_type_may_follow_its_dash_without_a_space() -> None:
         for dash in ("-", "- ")
     )
     assert imported(loose).problem == imported(plain).problem
+
+
+def test_objects_of_pddl_may_have_the_names_of_tasks_goals_and_facts(tmp_path: Path) -> None:
+    (tmp_path / "domain.pddl").write_text(
+        "(define (domain errands) (:requirements :strips :typing) (:types item) (:predicates (done ?x - item) (near ?x ?y - item))"
+        " (:action do :parameters (?x ?y - item) :precondition (and (near ?x ?y) (not (done ?x))) :effect (done ?x)))",
+        "utf-8",
+    )
+    (tmp_path / "problem.pddl").write_text(
+        "(define (problem p) (:domain errands) (:objects task goal1 fact1 - item)"
+        " (:init (near task goal1) (near goal1 fact1) (near fact1 task)) (:goal (and (done task) (done goal1) (done fact1))))",
+        "utf-8",
+    )
+    import_pddl(tmp_path / "domain.pddl", tmp_path / "problem.pddl", tmp_path / "scene.ttl")
+    assert len(confab.load(tmp_path / "scene.ttl").plan().plan.primitives) == 3
+    assert "error" not in {severity for severity, *_ in confab.validate(tmp_path / "scene.ttl")}
