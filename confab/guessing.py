@@ -1,9 +1,10 @@
 """The hint in the error about a wrong name.
 
 A wrong name is understood with certainty if the tables of `confab.hints` have it, or a name with the same words, for its kind of
-object or for an object that this object leads to, or if it is a name of another library's object that the object is converted to
-(``scene.graph``, ``plan.to_dataframe()``), or if it is a typing error. Then the hint is the right name alone. For any other name,
-the hint is an overview of the object, grouped by purpose; if a name in the tables has enough of the words, the hint begins with it.
+object or for an object that this object leads to, or if it is a typing error. Then the hint is the right name alone.
+
+For any other name, the hint is an overview of the object by purpose. The most likely name precedes the overview: a name of another
+library's object that the object is converted to (``plan.to_dataframe()``), or a name in the tables with enough of the words.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
+from contextlib import suppress
 from difflib import get_close_matches
 from functools import cache
 from importlib import import_module
@@ -164,20 +166,25 @@ def elsewhere(kind: str, name: str | frozenset[str]) -> str:
 def certain(kind: str, name: str) -> str:
     """Return the expression to use for a name that the tables know; return an empty text for any other name.
 
-    >>> certain("result", "elapsed"), certain("plan", "iterrows"), certain("result", "iloc"), certain("plan", "xyzzy")
-    ('seconds', 'to_dataframe().iterrows()', 'plan.to_dataframe().iloc', '')
+    >>> certain("result", "elapsed"), certain("result", "subplans"), certain("plan", "xyzzy")
+    ('seconds', 'plan.steps', '')
     """
     own = known(kind).get(name) or known(kind).get(parted(name)) or known(kind).get(words_of(name, kind))
-    if right := own or elsewhere(kind, name) or elsewhere(kind, parted(name)):
-        return right
+    return own or elsewhere(kind, name) or elsewhere(kind, parted(name))
+
+
+def of_form(kind: str, name: str) -> str:
+    """Return the expression for a name of an object of another library that an object is converted to, or an empty text.
+
+    >>> of_form("plan", "iterrows"), of_form("result", "iloc"), of_form("plan", "xyzzy")
+    ('to_dataframe().iterrows()', 'plan.to_dataframe().iloc', '')
+    """
     for form, path in FORMS.get(kind, {}).items():
         home, _, cls = path.rpartition(".")
-        try:
+        with suppress(ImportError):  # the library of an extra may not be installed
             found = getattr(getattr(import_module(home), cls), name, None)
-        except ImportError:  # the library of an extra isn't installed
-            continue
-        if found is not None:
-            return f"{form}.{name}{'()' if callable(found) else ''}"
+            if found is not None:
+                return f"{form}.{name}{'()' if callable(found) else ''}"
     return ""
 
 
@@ -227,18 +234,14 @@ def hint(kind: str, name: str, names: Collection[str] = ()) -> str:
         The public names of the object.
     """
     short = kind.split()[-1]
+    scene = "confab.load(SCENE)." if short == "confab" else "scene."  # users of the module may have no scene yet
     if right := certain(short, name):
-        return f"; use {expanded(short, right)}"
+        return f"; use {re.sub('^scene[.]', scene, right)}"
     if near := misspelt(name, names):
         return f"; did you mean '{near}'?"
     wanted = words_of(name, short)
-    perhaps = by_words(listed(short), wanted, short) or elsewhere(short, wanted)
-    return f"{f'; perhaps {expanded(short, perhaps)}' if perhaps else ''}{overview(kind, names)}"
-
-
-def expanded(kind: str, right: str) -> str:
-    """Return an expression for a suggestion of the module, whose users may have no scene yet."""
-    return re.sub(r"^scene\b", "confab.load(SCENE)", right) if kind == "confab" else right
+    perhaps = of_form(short, name) or by_words(listed(short), wanted, short) or elsewhere(short, wanted)
+    return f"; perhaps {re.sub('^scene[.]', scene, perhaps)}" * bool(perhaps) + overview(kind, names)
 
 
 def overview(kind: str, names: Collection[str] = ()) -> str:

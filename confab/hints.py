@@ -298,7 +298,6 @@ HINTS: Mapping[str, Mapping[str, str]] = {
         "problem.domain.levels": "level depth",
         "problem.domain.constraints": "constraints",
         "confab.practise(…)": "benchmark curve evaluate_memory",
-        "to_unified_planning().kind": "kind problem_kind",
         "graph": "to_turtle json",
         "execute()": "run apply goto",
         "plan()": "find_path plan_path",
@@ -431,7 +430,6 @@ HINTS: Mapping[str, Mapping[str, str]] = {
         "scene.plan(memory=memory)": "apply use guide rank query search",
         "table().csv()": "csv export_csv save_csv",
         "trust(REPLICAS)": "trusted",
-        "table()": "statistics",
     },
     "table": {
         "dataframe()": "plot df pandas sort filter frame groupby pivot to_numpy sort_values to_excel",
@@ -580,7 +578,6 @@ OPTIONS = {
     "instead": "step replace at in_place_of",
     "family": "kind type name template scenario",
     "behavior": "action operator skill behaviour name",
-    "from_observed": "initial_state input start",
 }
 """The names of the parameters in Python, each with other words for it. The option of a parameter has the parameter's name, with
 ``--`` before the name and ``-`` in place of ``_``.

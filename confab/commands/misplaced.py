@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from shlex import quote
@@ -28,7 +29,7 @@ OF_TEXTS = {
     QUERY: r"(?i)\s*(SELECT|ASK|CONSTRUCT|DESCRIBE|PREFIX)\b.*",
     INTERVENTION: r"(after|at)=\S+ .*",
     NUMBER: r"\d+",
-    FACT: r"\S+ [A-Z][A-Z_]+( \S+)*",
+    FACT: r"\S+ [A-Z]\w*( \S+)*",
 }
 """The kinds of other values, each with a pattern."""
 MOST = 3
@@ -43,8 +44,9 @@ def kind_of_value(value: str) -> str:
     >>> kind_of_value("three-cups"), kind_of_value("cup1 LOCATION location7"), kind_of_value("ASK { ?o ?p ?x }"), kind_of_value("x")
     ('a scene', 'a fact', 'a query', '')
     """
-    if Path(value).is_file():
-        return _kind_of_file(Path(value), Path(value).stat().st_mtime_ns)
+    with suppress(OSError, ValueError):  # the text can't be the name of a file, or the file can't be read
+        if Path(value).is_file():
+            return _kind_of_file(Path(value), Path(value).stat().st_mtime_ns)
     if value in ontology.scenes():
         return SCENE
     if any(file.stem == value for file in (ontology.ROOT / "questions").glob("**/*.rq")):
@@ -57,6 +59,12 @@ def _kind_of_file(path: Path, changed: int) -> str:
     """Return the kind of a file that was changed at a time; empty for other kinds of files."""
     found = kind_of(path)
     return next((kind for kind, name in OF_FILES.items() if found and re.search(name, found.name)), "")
+
+
+def _exists(value: str) -> bool:
+    with suppress(OSError, ValueError):
+        return Path(value).exists()
+    return True
 
 
 def taken(parameter: click.Parameter) -> str:
@@ -118,7 +126,7 @@ def rearranged(command: click.Command, words: Sequence[str]) -> tuple[Placed, li
             if not sure:
                 anywhere = [each for each in free(arguments) if kind in ("", NUMBER) or not taken(each)]
                 fitting = anywhere or (fitting if kind == NUMBER else [])
-                outputs = [each for each in free(options) if written(each) and kind == "" and not Path(value).exists()]
+                outputs = [each for each in free(options) if written(each) and kind == "" and not _exists(value)]
                 endings = ("", Path(value).suffix)
                 if outputs and (not fitting or (endings[1] and Path(outputs[0].metavar or "").suffix in endings)):
                     fitting = outputs

@@ -40,6 +40,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (["explain", SCENE, "plan.json"], f"use: confab explain {SCENE} --plan plan.json"),
         (["explain", SCENE, GOAL], f"'{GOAL}' is a fact; use: confab explain {SCENE} --not '{GOAL}'"),
         (["plan", SCENE, GOAL], f"use: confab plan {SCENE} --goal '{GOAL}'"),
+        (["plan", SCENE, "x" * 5000], "got unexpected extra argument"),
         (["plan", SCENE, *GOAL.split()], f"use: confab plan {SCENE} --goal '{GOAL}'"),
         (["plan", "--scene", SCENE], f"missing argument 'SCENE'; {SCENE} is a scene; use: confab plan {SCENE};"),
         (["plan", SCENE, "new.json"], f"use: confab plan {SCENE} -o new.json"),
@@ -80,7 +81,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (["scenes", SCENE], f"use: confab plan {SCENE} | "),
         (["verify", SCENE, "missing.json"], "confab: missing.json: can't be read"),
     ],
-    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+    ids=lambda value: " ".join(value)[:60] if isinstance(value, list) else "",
 )
 def test_a_value_at_a_wrong_place_is_answered_by_the_correct_command_line(
     files: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], line: list[str], right: str

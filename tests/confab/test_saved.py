@@ -86,8 +86,8 @@ def test_a_command_writes_the_page_of_a_saved_episode(tmp_path: Path) -> None:
     assert '"status":"reached"' in page.read_text()
     assert invoke(app, ["report", "towers-small", "-o", str(page)]).exit_code == 0
     assert '"status":"a plan, checked"' in page.read_text()
-    wrong = invoke(app, ["report", "towers-small", "--plan", str(visit), "-o", str(page)])
-    assert "belong together" in str(wrong.exception)
+    wrong = invoke(app, ["report", "towers-small", "--verdicts", str(visit), "-o", str(page)])
+    assert "--verdicts belong to a plan" in str(wrong.exception)
 
 
 @pytest.mark.parametrize("name", ["library-small", "carts-small", "rooms-snacks", "beverage-serving"])
