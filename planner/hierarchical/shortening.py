@@ -35,7 +35,7 @@ ORDERS = 8
 """Default work of shortening a plan, in sixteenths of the effort of finding the plan; more work leads to shorter plans."""
 SHUFFLES = 3
 """Number of random orders of the goals that are tried before small changes of the best order."""
-LEAST_EFFORT = 400_000
+LEAST_EFFORT = 600_000
 """Minimum effort that is assumed for finding the first plan; the unit is one operator in one state.
 
 Because of this minimum, the planner also shortens plans that were found with little effort.
@@ -86,7 +86,7 @@ def shorten_once(call: Call, work: int, leave_levels: bool, advised: Callable[[C
     levels = call.program.levels
     aside = len(levels) > 1 and puts_aside(call)
     if aside or (len(levels) > 1 and len(call.steps) > MANY * len(call.goal)):
-        reordered(call, work, advised, random)
+        reordered(call, work // 2, advised, random)
     if not leave_levels:
         return
     if aside:
