@@ -49,7 +49,7 @@ KNOWN: Mapping[str, int] = {
     "assembly-large": 211,
     "assembly-small": 38,
     "canal-large": 455,
-    "canteen-large": 53,
+    "canteen-large": 46,
     "canteen-small": 11,
     "couriers-large": 142,
     "drawers-large": 68,
