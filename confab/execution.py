@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import partial
 from pathlib import Path
+from random import Random
 from typing import TYPE_CHECKING, TypedDict
 
 from confab.accepting import AnyPlan, Facts, check_goal, check_noise, check_seconds, number, plan_of, possible, several
 from confab.formats import EpisodeJson
 from confab.interchange import episode_json
 from confab.intervening import parse_interventions
+from confab.planner.acting.dispatching import Together
 from confab.planner.acting.episode import End, Episode, Event, Intervention, InterventionKind, situation
 from confab.planner.acting.executive import act
 from confab.planner.acting.failure_memory import Caution
@@ -30,6 +33,7 @@ from confab.reasoner.names import RightNames, right_names
 from confab.reasoner.possible import violated
 from confab.reasoner.reading.goals import with_goals
 from confab.reasoner.symbols import Fact, Problem, Symbol
+from confab.timing import has_times
 
 if TYPE_CHECKING:
     from typing import Unpack
@@ -38,10 +42,13 @@ if TYPE_CHECKING:
 
     from confab.known import Known
     from confab.memory import Memory
+    from confab.planner.timed.plan import TimedPlan
     from confab.show import PlanTree
     from confab.sim.world import PhysicsWorld
 
 WORLDS = ("symbolic", "pybullet")
+SPREAD = Fraction(3, 10)
+"""The greatest relative deviation of a duration in a perturbed symbolic world."""
 
 
 @right_names("an execution", "scene.execute() or scene.read_episode(FILE)")
@@ -133,6 +140,8 @@ class Execution(metaclass=RightNames):
             text += (
                 f", {count} {word if count == 1 else word.replace('change', 'changes') + 's' * ('change' not in word)}"
             )
+        if has_times(self.scene.problem):
+            text += f", in {episode.seconds['simulated']:g} s"
         for met, what in ((True, "soft goal reached"), (False, "soft goal left unmet")):
             text += "".join(
                 f"; {what}: {one.fact} (weight {written(one.weight)})" for one in self.soft_goals if one.met is met
@@ -203,6 +212,7 @@ class ExecuteKeywords(TypedDict, total=False):
     perturb: bool
     noise: float
     both_hands: bool
+    schedule: TimedPlan | None
 
 
 def carry_out(
@@ -233,6 +243,10 @@ def carry_out(
 
         memory = Memory.load(memory, scene)
     planner = planner_of(mode, memory if isinstance(memory, Links) or memory is None else memory.links)
+    if memory is not None and not isinstance(memory, Links):
+        from confab.planner.timed.measuring import with_durations
+
+        problem = with_durations(problem, memory.statistics)
     if planner is None and memory is not None and not isinstance(memory, Links):
         from confab.planner.experience.advice import plan as plan_with
 
@@ -241,6 +255,7 @@ def carry_out(
     texts = several(interventions)
     check_seconds("time_limit", time_limit)
     with within(time_limit), spectator(watch, observer) as heard:
+        options["schedule"] = getattr(plan, "timed", None)
         return execute(scene, problem, begun, texts, world, planner, seed, heard, **options)
 
 
@@ -287,8 +302,11 @@ def execute(
     perturb: bool = False,
     noise: float = 0.0,
     both_hands: bool = False,
+    schedule: TimedPlan | None = None,
 ) -> Execution:
     """Execute a task in a closed loop of action and observation.
+
+    A task with durations, deadlines or windows is executed by all actors at once.
 
     Parameters
     ----------
@@ -314,11 +332,14 @@ def execute(
     caution : Caution, optional
         The knowledge that was learned from failures in earlier episodes.
     perturb : bool
-        Vary poses, friction, masses and filled amounts in PyBullet at random, with `seed`.
+        With `seed`, vary poses, friction, masses and filled amounts in PyBullet at random; vary durations in a symbolic world by up to
+        30 %.
     noise : float
         Standard deviation of perceived positions in PyBullet, in metres.
     both_hands : bool
-        In PyBullet, execute the plan with all hands at once. After a failure, execute the remaining steps one after another.
+        Execute the plan with all hands at once. After a failure, execute the remaining steps one after another.
+    schedule : TimedPlan, optional
+        The schedule of `plan`.
 
     Raises
     ------
@@ -331,11 +352,15 @@ def execute(
     check_noise(noise)
     if noise and world != "pybullet":
         raise KnowledgeError(f"noise of {noise:g} m: only in the world pybullet, since nothing is measured elsewhere")
-    if both_hands and world != "pybullet":
-        raise KnowledgeError("both hands at once: only in the world pybullet")
+    if both_hands and world not in WORLDS:
+        raise KnowledgeError(f"both hands at once: only in the worlds {' and '.join(WORLDS)}")
+    together = Together(schedule, SPREAD if perturb else Fraction(0)) if both_hands or has_times(problem) else None
     if world == "symbolic":
-        world = SymbolicWorld(problem)
-    elif isinstance(world, str) and ":" in world:
+        symbolic = SymbolicWorld(problem, stretch=_stretched(seed) if perturb else _as_expected)
+        with possible():
+            episode = act(problem, symbolic, plan, wanted, planner, retry_policy, observer, caution, together)
+        return Execution(scene, episode)
+    if isinstance(world, str) and ":" in world:
         from confab.connecting import connected
 
         world, stated = connected(scene, problem, world, seed)
@@ -366,8 +391,18 @@ def execute(
         for intervention in wanted:
             if (why := live.impossible(intervention)) is not None:
                 raise KnowledgeError(f"'{intervention.text}' can't happen in PyBullet: {why}")
-        episode = act(problem, live, plan, wanted, planner, retry_policy, observer, caution, both_hands)
+        episode = act(problem, live, plan, wanted, planner, retry_policy, observer, caution, together)
         return Execution(scene, episode)
+
+
+def _as_expected(seconds: Fraction) -> Fraction:
+    return seconds
+
+
+def _stretched(seed: int) -> Callable[[Fraction], Fraction]:
+    """Return a function that varies durations at random, by at most `SPREAD`."""
+    rng = Random(seed)
+    return lambda expected: expected * (1 + SPREAD * Fraction(rng.randint(-1000, 1000), 1000))
 
 
 def _reach_of(scene: Known) -> str:

@@ -32,6 +32,8 @@ class View:
             self.log.append(f"✋ {event.text}")
         elif event.what == "discovery":
             self.log.append(f"👁 {event.text}")
+        elif event.what == "late":
+            self.log.append(f"⌛ {event.text}")
         elif event.what in ("repair", "replan"):
             self.log.append(f"↻ {event.what}: {event.text}")
         elif event.what == "over":

@@ -26,6 +26,7 @@ from confab.reasoner.names import right_arguments, right_names
 from confab.reasoner.symbols import FALSE, Fact
 from confab.reasoner.vocabulary import CORE, INDIVIDUAL, OWL
 from confab.table import Table
+from confab.timing import asks_for_times
 
 if TYPE_CHECKING:
     from typing import Unpack
@@ -150,7 +151,8 @@ class Scene(Known):
         """
         from confab.execution import carry_out
 
-        if plan is None and self.problem.weights:  # the plan determines the soft goals to reach
+        if plan is None and (self.problem.weights or asks_for_times(self.problem, None)):
+            # the plan determines the soft goals to reach, and the schedule
             chosen = self.plan(several(goals), memory, mode, time_limit)
             plan = chosen if chosen.solved else None
         return carry_out(

@@ -19,6 +19,7 @@ from confab.planner.acting.schedule import WorkerSlot
 from confab.planner.acting.symbolic_world import disturbed, with_individual
 from confab.planner.acting.world import INTERRUPTED
 from confab.planner.plan import Step
+from confab.planner.timed.dispatch import Dispatch
 from confab.reasoner.embodiment.values import Body
 from confab.reasoner.possible import refuse_impossible
 from confab.reasoner.symbols import Fact, Problem, State
@@ -120,9 +121,9 @@ class LiveWorld:
         return verdict
 
     def execute_together(
-        self, problem: Problem, primitives: Sequence[Step], may_begin: Callable[[Set[tuple[int, ...]]], bool]
+        self, dispatch: Dispatch, may_begin: Callable[[Set[int]], bool]
     ) -> list[tuple[WorkerSlot, Verdict]]:
-        """Execute primitives with all hands at once, and return the primitives that ended, in the order of their begins.
+        """Execute the primitives of a dispatch with all hands at once; return those that ended, in the order of their begins.
 
         An intervention stops the running primitives of the objects that it changes; the other running primitives end.
         """
@@ -133,7 +134,7 @@ class LiveWorld:
             return now
 
         try:
-            done = perform_together(self.world, problem, primitives, may_begin=may_begin, changed=changed)
+            done = perform_together(self.world, dispatch, may_begin=may_begin, changed=changed)
         finally:
             self.changed = None
         if not done.ok:

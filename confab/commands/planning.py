@@ -297,9 +297,11 @@ def verify(
 )
 @click.option("--report", type=Output(REPORT), metavar="FILE.html", help="Write the episode as an HTML page.")
 @SCENE_IRI
-@click.option("--perturb", is_flag=True, help="Vary poses, friction, masses and filled amounts.")
+@click.option(
+    "--perturb", is_flag=True, help="Vary poses, friction, masses, filled amounts; durations without physics."
+)
 @NOISE
-@click.option("--both-hands", is_flag=True, help="In PyBullet: execute with all hands at once.")
+@click.option("--both-hands", is_flag=True, help="Execute with all hands at once; tasks with times always are.")
 @click.option("--learn", is_flag=True, help="Learn from the episode and its failures into --memory.")
 @TIME_LIMIT
 @click.option(

@@ -56,8 +56,8 @@ class Following:
                 note = "; ".join(f"{s.symbol}: expected {s.expected}, seen {s.observed}" for s in event.surprises)
                 self._bars.append(Bar(step, begin, event.seconds, done, note))
                 self._begun = None
-            elif event.what in ("intervention", "discovery", "repair", "replan"):
-                text = event.text if event.what in ("intervention", "discovery") else f"{event.what}: {event.text}"
+            elif event.what in ("intervention", "discovery", "late", "repair", "replan"):
+                text = f"{event.what}: {event.text}" if event.what in ("repair", "replan") else event.text
                 self._marks.append((event.seconds, text))
 
     def _believe(self, belief: Problem, now: float) -> None:

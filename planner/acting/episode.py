@@ -228,7 +228,7 @@ class Episode:
 class Event:
     """An event for observers, with the time on the world's clock, and the executive's task (`belief`) in the present situation."""
 
-    what: str  # plan, begin, end, intervention, discovery, repair, replan, over
+    what: str  # plan, begin, end, intervention, discovery, late, repair, replan, over
     plan: Plan
     done: frozenset[tuple[int, ...]]
     step: Step | None = None

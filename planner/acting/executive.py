@@ -14,13 +14,15 @@ are counted and planning has limits.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence, Set
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from time import perf_counter
 
 from confab.planner.acting.agenda import Postponed, RemainingSteps, chains_of, tree_of, without
 from confab.planner.acting.belief import UNSEEN, Belief
+from confab.planner.acting.dispatching import Remaining, Together, remaining
 from confab.planner.acting.episode import (
     End,
     Episode,
@@ -43,7 +45,7 @@ from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, 
 from confab.planner.validation import followed, open_goals
 from confab.reasoner.limits import LimitError, check
 from confab.reasoner.refutations import Refutation
-from confab.reasoner.symbols import FALSE, Fact, Problem, State, Symbol
+from confab.reasoner.symbols import FALSE, Fact, Problem, State, Symbol, Times
 
 
 def act(
@@ -55,7 +57,7 @@ def act(
     retry_policy: RetryPolicy = DEFAULT,
     observer: Callable[[Event], None] | None = None,
     caution: Caution | None = None,
-    together: bool = False,
+    together: Together | None = None,
 ) -> Episode:
     """Execute a task in a world until all goals are achieved, the task is proved impossible, or a limit is reached.
 
@@ -76,8 +78,8 @@ def act(
         Function that is called with every `Event`.
     caution : Caution, optional
         Failures in earlier episodes; unreliable facts and behaviours are avoided if there is an alternative.
-    together : bool
-        Whether several actors execute primitives at once, until a primitive fails; the world must be `Concurrent`.
+    together : Together, optional
+        Several actors execute primitives at once, until a primitive fails; the world must be `Concurrent`.
     """
     if caution is not None and plan is None:
         problem = caution.applied(problem, planner or hierarchical_plan, retry_policy.planning)
@@ -100,10 +102,10 @@ def act(
                 run.reconsider()
             elif not run.agenda.steps:
                 run.finish()
+            elif run.together and (left := run.remaining()) is not None:
+                run.perform_together(left)
             elif (expected := run.expected()) is None:
                 run.request_replan("the next primitive's precondition doesn't hold")
-            elif run.together:
-                run.perform_together()
             else:
                 chain, before, verdict = run.perform(expected)
                 if not verdict.ok:
@@ -127,10 +129,13 @@ class _RunningEpisode:
     planner: Planner | None
     retries: Retries
     observer: Callable[[Event], None] | None
-    together: bool
+    together: Together | None
     going: bool = True
     goals: Postponed = field(default_factory=Postponed)
     requested: str = ""  # the reason for checking the agenda, if a check is requested
+    late: dict[Symbol, Fraction] = field(
+        default_factory=dict
+    )  # goals that can't be in time, and since when this is known
     missed: dict[Symbol, str | None] = field(default_factory=dict)  # values that were expected and not observed
 
     def __post_init__(self) -> None:
@@ -168,12 +173,21 @@ class _RunningEpisode:
             return
         if self.goals.put_off:
             record.status = End.GAVE_UP
-        for reason in self.goals.reasons():
+        for reason in (*self.goals.reasons(), *self.missed_deadlines()):
             record.reason(reason)
         self.going = False
         if record.reasons and record.status is End.REACHED:
             record.status = End.IMPOSSIBLE
         self.say("over", text=record.status.value)
+
+    def missed_deadlines(self) -> Iterator[Reason]:
+        """Yield a reason for each goal that was reached after its deadline."""
+        for goal, by in (self.belief.problem.times or Times()).deadlines.items():
+            reached = max((change.seconds for change in self.record.course if change.symbol == goal), default=0.0)
+            if goal in self.belief.goal and reached > by:
+                known = f"; this was known at {float(self.late[goal]):g} s" if goal in self.late else ""
+                fact = Fact(goal, self.belief.goal[goal])
+                yield Reason(f"{fact} is a goal by {float(by):g} s, and holds from {reached:g} s on{known}")
 
     def break_off(self, why: str) -> None:
         """End the episode at once, because the world doesn't respond."""
@@ -248,21 +262,47 @@ class _RunningEpisode:
             self.agenda.begun.setdefault(above.path, before)
         return [Fact(s, v) for s, v in sorted(after.items()) if before.get(s) != v]
 
-    def perform_together(self) -> None:
+    def remaining(self) -> Remaining | None:
+        """Return the dispatch of the remaining primitives; without a schedule, one primitive at a time is executed from now on."""
+        assert self.together is not None
+        now = Fraction(self.world.seconds)
+        found = remaining(self.belief.task, Plan(self.agenda.steps).primitives, now, self.together)
+        if isinstance(found, Reason):
+            self.together = None
+            return None
+        for goal in found.given_up:
+            self.tell_late(goal, now)
+        return found
+
+    def tell_late(self, goal: Symbol, now: Fraction) -> None:
+        """Say once that the deadline of a goal can't be kept any more."""
+        if goal not in self.late:
+            self.late[goal] = now
+            self.say("late", text=f"the deadline of {goal} can't be kept any more")
+
+    def perform_together(self, left: Remaining) -> None:
         """Execute the remaining primitives with all actors at once, until all have ended or something unexpected happens.
 
         The world is observed afterwards. After a failure, the episode continues with one primitive at a time.
         """
         record, state, finished = self.record, self.belief.problem.initial, set[tuple[int, ...]]()
         chains = {chain[-1].path: chain for chain in chains_of(self.agenda.steps)}
-        ended = self.world.execute_together(
-            self.belief.problem, [chain[-1] for chain in chains.values()], lambda done: not self.due(done)
-        )
+        start, paths = Fraction(self.world.seconds), left.paths
+
+        def may_begin(done: Set[int]) -> bool:
+            now = Fraction(self.world.seconds) - start
+            for late in left.dispatch.late(now):
+                if late.certain:
+                    self.tell_late(late.goal, start + now)
+            return not self.due({paths[number] for number in done})
+
+        ended = self.world.execute_together(left.dispatch, may_begin)
         self.note_what_happened_by_the_clock()
         seen, problem = self.world.observe(), self.belief.problem
         failed = list[tuple[tuple[Step, ...], State, Verdict]]()
         for slot, verdict in ended:
-            step, chain = slot.step, chains[slot.step.path]
+            chain = chains[paths[slot.position]]
+            step = chain[-1]
             after = followed(problem, [step], state) or state
             changes = self.begin(chain, state, after)
             relied_on = tuple(relied_on_by(problem, chain))
@@ -284,7 +324,7 @@ class _RunningEpisode:
         if len(record.events) >= self.retries.most:
             self.give_up(Reason(f"stopped at the limit of {self.retries.most} primitives"))
         for chain, before, verdict in failed:
-            self.together = self.together and verdict.code == INTERRUPTED
+            self.together = self.together if verdict.code == INTERRUPTED else None
             self.learn_from(chain, before, verdict)
 
     def without_effect(self, changes: Sequence[Fact], seen: State) -> bool:

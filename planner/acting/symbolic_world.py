@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Set
+from contextlib import suppress
 from dataclasses import replace
+from fractions import Fraction
+from heapq import heappop, heappush
+from typing import TYPE_CHECKING
 
 from confab.planner.acting.discovery import Discovery
 from confab.planner.acting.episode import Intervention, InterventionKind
+from confab.planner.acting.schedule import WorkerSlot
 from confab.planner.acting.world import INTERRUPTED, WorldReport
 from confab.planner.plan import Step
+from confab.planner.timed.activities import InapplicableError, StepSimulation
+from confab.planner.timed.pieces import SECOND
 from confab.planner.validation import successor
 from confab.reasoner.aggregates.totals import following
 from confab.reasoner.possible import PLACE, refuse_impossible
 from confab.reasoner.symbols import Problem, State, Symbol, spread_to
+
+if TYPE_CHECKING:
+    from confab.planner.timed.dispatch import Dispatch
 
 DONE = WorldReport(True)
 FaultInjection = Callable[[Step, State], WorldReport | None]
@@ -20,19 +30,34 @@ FaultInjection = Callable[[Step, State], WorldReport | None]
 
 
 class SymbolicWorld:
-    """A world that begins in a problem's initial state; a primitive takes its duration (one second) and then has its effects."""
+    """A world that begins in a problem's initial state; a primitive takes its duration and then has its effects.
+
+    Parameters
+    ----------
+    problem : Problem
+    seconds_of : mapping of behaviour to seconds, optional
+        Durations that replace the durations in the problem (docs/levels.md, "In time").
+    fault : callable, optional
+    stretch : callable
+        Function that returns the actual duration of a primitive, given its expected duration in seconds.
+    """
 
     measured = False
     """Whether the clock is measured: durations in this world are assumed, so that nothing is learned from them."""
 
     def __init__(
-        self, problem: Problem, seconds_of: Mapping[str, float] | None = None, fault: FaultInjection | None = None
+        self,
+        problem: Problem,
+        seconds_of: Mapping[str, float] | None = None,
+        fault: FaultInjection | None = None,
+        stretch: Callable[[Fraction], Fraction] = lambda expected: expected,
     ) -> None:
         self.problem = problem
         self.state: dict[Symbol, str] = dict(problem.initial)
         self.seconds = 0.0
         self._seconds_of = dict(seconds_of or {})
         self._fault = fault
+        self._stretch = stretch
         self._waiting: list[Intervention] = []
         self._news: list[Discovery] = []
 
@@ -46,14 +71,10 @@ class SymbolicWorld:
 
     def execute(self, step: Step) -> WorldReport:
         """Execute a primitive; an intervention stops the running primitive if the primitive's precondition no longer holds."""
-        end = self.seconds + self._seconds_of.get(step.behavior, 1.0)
+        end = self.seconds + float(self._lasting(step))
         disturbed = False
         while self._waiting and (self._waiting[0].at or 0.0) < end:
-            happening = self._waiting.pop(0)
-            self.seconds = max(self.seconds, happening.at or 0.0)
-            if happening.of_world:
-                self.disturb(happening)
-                disturbed = True
+            disturbed = self._disturbed_by_the_clock() or disturbed
         behavior = self.problem.domain.behaviors.get(step.behavior)
         after = None if behavior is None else successor(self.problem, behavior, step.arguments, self.state)
         if after is None:
@@ -65,6 +86,81 @@ class SymbolicWorld:
             return fault
         self.state = after
         return DONE
+
+    def execute_together(
+        self, dispatch: Dispatch, may_begin: Callable[[Set[int]], bool]
+    ) -> list[tuple[WorkerSlot, WorldReport]]:
+        """Execute the primitives of a dispatch; an intervention stops a primitive if its conditions don't hold until its end."""
+        start, now = Fraction(self.seconds), Fraction(0)
+        course = StepSimulation(replace(self.problem, initial=self.state), list(map(dispatch.step, dispatch.waiting)))
+        running, ended = list[tuple[Fraction, int, Fraction]](), dict[int, tuple[WorkerSlot, WorldReport]]()
+
+        def report(number: int, begin: Fraction, verdict: WorldReport) -> None:
+            worker = "".join(dispatch.order.activities[number].actors[:1])
+            slot = WorkerSlot(course.steps[number], number, worker, float(start + begin), float(start + now))
+            ended[number] = slot, verdict
+
+        def going_on() -> bool:
+            return all(verdict.ok for _, verdict in ended.values()) and may_begin(ended.keys())
+
+        while True:
+            while going_on() and (ready := dispatch.ready(now)):
+                number = ready[0]
+                try:
+                    course.begin(number)
+                except InapplicableError as error:
+                    report(number, now, _inapplicable(course.steps[number], str(error)))
+                    break
+                dispatch.begin(number, now)
+                given = self._seconds_of.get(course.steps[number].behavior, course.seconds[number])
+                heappush(running, (now + self._stretch(Fraction(given)), number, now))
+            wakes = dispatch.wakes(now) if going_on() else None
+            times = [end for end, *_ in running[:1]] + ([] if wakes is None else [wakes])
+            if not times:
+                break
+            if self._waiting and Fraction(self._waiting[0].at or 0.0) - start < min(times):
+                self.state = course.facts.state()
+                self._disturbed_by_the_clock()
+                now = max(now, Fraction(self.seconds) - start)
+                course.change(replace(self.problem, initial=self.state))
+                continue
+            now = min(times)
+            self.seconds = float(start + now)
+            while running and running[0][0] == now:
+                _, number, begin = heappop(running)
+                report(number, begin, self._ended(course, number))
+                dispatch.end(number, now)
+        self.state = course.facts.state()
+        return sorted(ended.values(), key=lambda one: (one[0].begin, one[0].position))
+
+    def _ended(self, course: StepSimulation, number: int) -> WorldReport:
+        """Make the effects of the end of a primitive, unless an intervention or a fault prevents them."""
+        step = course.steps[number]
+        if not course.still_possible(number):
+            return WorldReport(False, INTERRUPTED, step.arguments, "its precondition was lost in the meantime")
+        fault = self._fault(step, course.facts.state()) if self._fault is not None else None
+        if fault is not None:
+            return fault
+        try:
+            course.end(number)
+        except InapplicableError as error:
+            return _inapplicable(step, str(error))
+        return DONE
+
+    def _lasting(self, step: Step) -> Fraction:
+        """Return the duration of a primitive that begins now; an inapplicable primitive takes a second."""
+        course = StepSimulation(replace(self.problem, initial=self.state), [step])
+        with suppress(InapplicableError, KeyError):
+            course.begin(0)
+        return self._stretch(Fraction(self._seconds_of.get(step.behavior, course.seconds.get(0, SECOND))))
+
+    def _disturbed_by_the_clock(self) -> bool:
+        """Make the next announced intervention take place; return whether the intervention changes the world."""
+        happening = self._waiting.pop(0)
+        self.seconds = max(self.seconds, happening.at or 0.0)
+        if happening.of_world:
+            self.disturb(happening)
+        return happening.of_world
 
     def stop(self) -> None:
         """Do nothing, because a primitive of a symbolic world takes no computing time."""
@@ -125,6 +221,10 @@ class SymbolicWorld:
         self.problem = met(self.problem, found)
         self._news.append(found)
         self.state[symbol] = name
+
+
+def _inapplicable(step: Step, why: str) -> WorldReport:
+    return WorldReport(False, "not applicable", step.arguments, why)
 
 
 def disturbed(problem: Problem, state: State, intervention: Intervention) -> dict[Symbol, str]:

@@ -17,11 +17,12 @@ from confab.planner.acting.discovery import Discovery
 from confab.planner.plan import Step
 from confab.reasoner.limits import current
 from confab.reasoner.possible import ImpossibleStateError
-from confab.reasoner.symbols import Fact, Problem, State, Symbol
+from confab.reasoner.symbols import Fact, State, Symbol
 
 if TYPE_CHECKING:
     from confab.planner.acting.episode import Intervention
     from confab.planner.acting.schedule import WorkerSlot
+    from confab.planner.timed.dispatch import Dispatch
 
 logger = logging.getLogger(__name__)
 
@@ -98,11 +99,12 @@ class Concurrent(World, Protocol):
     """A world in which several actors execute primitives at once."""
 
     def execute_together(
-        self, problem: Problem, primitives: Sequence[Step], may_begin: Callable[[Set[tuple[int, ...]]], bool]
+        self, dispatch: Dispatch, may_begin: Callable[[Set[int]], bool]
     ) -> Sequence[tuple[WorkerSlot, Verdict]]:
-        """Execute primitives in their necessary order, and return the primitives that ended, in the order of their begins.
+        """Execute the primitives of a dispatch, and return the primitives that ended, in the order of their begins.
 
-        No primitive begins after a failure, nor while `may_begin` returns false for the paths of the finished primitives.
+        No primitive begins after a failure, nor while `may_begin` returns false for the numbers of the finished primitives. The
+        clock of the dispatch begins with 0; the slots have times on the world's clock.
         """
 
 
@@ -163,11 +165,11 @@ class Guarded:
         return said
 
     def execute_together(
-        self, problem: Problem, primitives: Sequence[Step], may_begin: Callable[[Set[tuple[int, ...]]], bool]
+        self, dispatch: Dispatch, may_begin: Callable[[Set[int]], bool]
     ) -> Sequence[tuple[WorkerSlot, Verdict]]:
         """Execute primitives with several actors at once, as `Concurrent.execute_together`."""
         with _asking("execute_together()"):
-            return cast("Concurrent", self.world).execute_together(problem, primitives, may_begin)
+            return cast("Concurrent", self.world).execute_together(dispatch, may_begin)
 
     def stop(self) -> None:
         """Stop the running primitive; ignore an error raised by the world's `stop`."""

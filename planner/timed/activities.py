@@ -119,7 +119,7 @@ def activities(problem: Problem, steps: Sequence[Step], events: Iterable[StepEve
     InapplicableError
         A step isn't applicable at its position in the events.
     """
-    course = _StepSimulation(problem, steps)
+    course = StepSimulation(problem, steps)
     for number, moment in events:
         check("finding the order that the steps need")
         if moment is not EventKind.END:
@@ -134,7 +134,7 @@ def in_sequence(steps: Sequence[Step]) -> Iterator[StepEvent]:
     yield from ((number, EventKind.WHOLE) for number in range(len(steps)))
 
 
-class _StepSimulation:
+class StepSimulation:
     """The simulation of a sequence of steps on symbols."""
 
     def __init__(self, problem: Problem, steps: Sequence[Step]) -> None:
@@ -179,6 +179,19 @@ class _StepSimulation:
         for cell, (_, after) in self.made[number]["middle"].changes.items():
             self.facts.put(*cell, after)
         self.made[number]["end"] = self.done(self.steps[number], self.piece(number).end, self.terms[number], True)
+
+    def still_possible(self, number: int) -> bool:
+        """Return whether the conditions that a begun step requires throughout hold now."""
+        try:
+            self.done(self.steps[number], self.piece(number).held, self.terms[number], False)
+        except InapplicableError:
+            return False
+        return True
+
+    def change(self, problem: Problem) -> None:
+        """Continue in the initial state of a problem; the steps in progress keep the effects that their begins determined."""
+        self.problem, self.rules = problem, BehaviorReader(problem)
+        self.facts = ReadRecorder(problem, self.rules)
 
     def done(self, step: Step, piece: Behavior, terms: Arguments, put: bool) -> Access:
         """Return the reads and changes of a part of a step; if `put` is true, make the changes."""

@@ -68,9 +68,13 @@ class Dispatch:
         A timed plan of the problem that the checker accepts.
     spread : Fraction
         The greatest relative deviation of a duration from the expected duration.
+    same_actors : bool
+        Whether every primitive keeps its actors; otherwise another actor may take a turn that hasn't begun.
     """
 
-    def __init__(self, problem: Problem, timed: TimedPlan, spread: Fraction = Fraction(0)) -> None:
+    def __init__(
+        self, problem: Problem, timed: TimedPlan, spread: Fraction = Fraction(0), same_actors: bool = False
+    ) -> None:
         self.problem, self.plan, self.spread = problem, timed.plan, spread
         steps, events = timed.plan.primitives, list(_events(timed))
         self.order = order_of(problem, activities(problem, steps, events), events)
@@ -78,7 +82,8 @@ class Dispatch:
         self.turns = self.order.turns
         every = [*self.network.edges, *turn_edges(self.order, self.turns)]
         self.controlled = all(low == BEGIN for *_, low in every)
-        self.choices = choices_of(problem, timed.plan, self.order, self.network) if self.controlled else ActorChoices()
+        fixed = same_actors or not self.controlled
+        self.choices = ActorChoices() if fixed else choices_of(problem, timed.plan, self.order, self.network)
         times = problem.times or Times()
         self._untimed = replace(problem, times=Times(events=times.events))
         self.begun: dict[int, int] = {}

@@ -294,6 +294,33 @@ def test_figure_8_in_pybullet_with_the_cup_really_moved() -> None:
     assert execution.episode.failures == ()
 
 
+OVENS = (Path(__file__).parents[1] / "planner" / "cases" / "ovens.ttl").read_text("utf-8")
+
+
+@pytest.mark.parametrize(("text", "seconds"), [(OVENS, 120), (OVENS.replace("c:never true ; ", ""), 60)])
+def test_a_task_with_durations_is_executed_in_time_and_keeps_its_constraints(
+    tmp_path: Path, text: str, seconds: float
+) -> None:
+    (tmp_path / "ovens.ttl").write_text(text, "utf-8")
+    scene = confab.load(tmp_path / "ovens.ttl")
+    for run in (scene.execute(), scene.execute(scene.plan(minimise="makespan"))):
+        assert run.reached
+        assert run.violations == []
+        assert run.summary().endswith(f"in {seconds:g} s")
+    varied = [scene.execute(perturb=True, seed=seed).episode.seconds["simulated"] for seed in (1, 2, 2)]
+    assert varied[0] != varied[1] == varied[2]
+
+
+def test_a_missed_deadline_is_the_reason_for_impossible(tmp_path: Path) -> None:
+    goal = ":g1 a owl:NamedIndividual, c:ValueCondition ;"
+    (tmp_path / "late.ttl").write_text(OVENS.replace(goal, f'{goal} c:by "PT30S"^^xsd:dayTimeDuration ;'), "utf-8")
+    run = confab.load(tmp_path / "late.ttl").execute()
+    assert not run.reached
+    assert (
+        run.episode.reasons[0].text == "o1 DONE true is a goal by 30 s, and holds from 60 s on; this was known at 0 s"
+    )
+
+
 @pytest.mark.slow
 def test_both_hands_in_pybullet_are_faster_and_never_touch() -> None:
     execution = confab.load("beverage-serving").execute(world="pybullet", both_hands=True)

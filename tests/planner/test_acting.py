@@ -1,6 +1,6 @@
 """The executive in a symbolic world: interventions by people, and the reactions of the executive."""
 
-from collections.abc import Callable, Sequence, Set
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
 
@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from confab.planner.acting.dispatching import Together
 from confab.planner.acting.episode import End, Episode, Event, Intervention, InterventionKind
 from confab.planner.acting.executive import act
 from confab.planner.acting.failure_memory import Caution
 from confab.planner.acting.retries import RetryPolicy
-from confab.planner.acting.schedule import WorkerSlot
 from confab.planner.acting.symbolic_world import SymbolicWorld
-from confab.planner.acting.world import Verdict, WorldReport
+from confab.planner.acting.world import WorldReport
 from confab.planner.hierarchical.planner import plan
 from confab.planner.paper.hierarchy import plan as paper_plan
 from confab.planner.paper.learning import learn
@@ -25,7 +25,6 @@ from confab.reasoner.graph.knowledge import load
 from confab.reasoner.memory.links import Links
 from confab.reasoner.reading.problem import read
 from confab.reasoner.symbols import FALSE, Fact, Problem, State, Symbol
-from tests.planner.slots import schedule
 
 SERVED_AS_IN_FIGURE_8 = {
     22: {2: [6, 28, 32], 22: [18, 30, 32]},
@@ -533,21 +532,6 @@ def test_a_goal_is_impossible_after_the_removal_of_all_objects() -> None:
     assert episode.goal == {}
 
 
-class SeveralHands(SymbolicWorld):
-    """A symbolic world whose hands execute primitives in the order of a schedule."""
-
-    def execute_together(
-        self, problem: Problem, primitives: Sequence[Step], may_begin: Callable[[Set[tuple[int, ...]]], bool]
-    ) -> list[tuple[WorkerSlot, Verdict]]:
-        ended: list[tuple[WorkerSlot, Verdict]] = []
-        for slot in schedule(problem, primitives):
-            if all(one.ok for _, one in ended) and may_begin({one.step.path for one, _ in ended}):
-                begin = self.seconds
-                verdict = self.execute(slot.step)
-                ended.append((replace(slot, begin=begin, end=self.seconds), verdict))
-        return ended
-
-
 @settings(max_examples=25)
 @given(
     position=st.integers(0, 31),
@@ -557,8 +541,8 @@ class SeveralHands(SymbolicWorld):
 def test_several_hands_reach_the_goals_after_any_intervention(
     position: int, inside: bool, change: Callable[..., Intervention]
 ) -> None:
-    when = {"at": position + 0.5} if inside else {"after": planned().primitives[position].path}
-    episode = act(serving(), SeveralHands(serving()), planned(), [change("location8", **when)], together=True)
+    when = {"at": position * 22 / 32 + 0.2} if inside else {"after": planned().primitives[position].path}
+    episode = act(serving(), SymbolicWorld(serving()), planned(), [change("location8", **when)], together=Together())
     assert episode.status is End.REACHED
     assert holds(episode)
     assert not episode.missed
@@ -568,7 +552,7 @@ def test_several_hands_reach_the_goals_after_any_intervention(
 def test_several_hands_begin_nothing_more_once_an_intervention_is_due() -> None:
     after = planned().primitives[5].path
     episode = act(
-        serving(), SeveralHands(serving()), planned(), [moved("cup2", "location8", after=after)], together=True
+        serving(), SymbolicWorld(serving()), planned(), [moved("cup2", "location8", after=after)], together=Together()
     )
     ((_, seconds),) = episode.interventions
     last = max(event.end for event in episode.events if event.begin < seconds)

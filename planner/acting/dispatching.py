@@ -1,0 +1,135 @@
+"""The steps that remain in an episode as a temporal network, and the deadlines that can't be kept (docs/levels.md, "In time")."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+from confab.planner.plan import Plan, Reason, Step
+from confab.planner.timed.activities import in_sequence
+from confab.planner.timed.call import Timed, in_time
+from confab.planner.timed.dispatch import Dispatch
+from confab.planner.timed.plan import TimedPlan
+from confab.reasoner.symbols import Problem, Symbol, Times
+
+
+@dataclass(frozen=True)
+class Together:
+    """How several actors execute primitives at once.
+
+    Attributes
+    ----------
+    schedule : TimedPlan, optional
+        The schedule of the first plan; otherwise the first plan is scheduled, too.
+    spread : Fraction
+        The greatest relative deviation of a duration from the expected duration.
+    """
+
+    schedule: TimedPlan | None = None
+    spread: Fraction = Fraction(0)
+
+
+@dataclass(frozen=True)
+class Remaining:
+    """The dispatch of the remaining primitives.
+
+    Attributes
+    ----------
+    dispatch : Dispatch
+        The dispatch; its clock begins with 0.
+    paths : tuple of path
+        The path of each primitive of the dispatch in the tree of steps.
+    given_up : tuple of Symbol
+        The goals whose deadlines can't be kept.
+    """
+
+    dispatch: Dispatch
+    paths: tuple[tuple[int, ...], ...]
+    given_up: tuple[Symbol, ...] = ()
+
+
+def later(times: Times, seconds: Fraction) -> Times:
+    """Return the times of a task in seconds from a later moment; events and windows that are over are left out."""
+    return replace(
+        times,
+        deadlines={goal: by - seconds for goal, by in times.deadlines.items()},
+        windows={one: tuple(_open(its, seconds)) for one, its in times.windows.items()},
+        events={name: at - seconds for name, at in times.events.items() if at >= seconds},
+    )
+
+
+def _open(
+    windows: Iterable[tuple[Fraction, Fraction | None]], seconds: Fraction
+) -> Iterator[tuple[Fraction, Fraction | None]]:
+    for low, high in windows:
+        if high is None or high > seconds:
+            yield max(low - seconds, Fraction(0)), None if high is None else high - seconds
+
+
+def remaining(
+    problem: Problem, primitives: Sequence[Step], seconds: Fraction, together: Together
+) -> Remaining | Reason:
+    """Return the dispatch of primitives that are applicable one after another, or the reason why they have no schedule.
+
+    Parameters
+    ----------
+    problem : Problem
+        The task; its initial state is the present situation.
+    primitives : sequence of Step
+    seconds : Fraction
+        The time since the beginning of the plan.
+    together : Together
+        The schedule is used if it is a schedule of the primitives.
+    """
+    times = later(problem.times or Times(), seconds)
+    flat = Plan(tuple(replace(step, path=(number,)) for number, step in enumerate(primitives)))
+    found, given_up = Timed(together.schedule), tuple[Symbol, ...]()
+    if together.schedule is None or [*map(_kind, together.schedule.plan.primitives)] != [*map(_kind, primitives)]:
+        found, given_up = _scheduled(replace(problem, times=times), flat)
+    if found.plan is None:
+        return found.reason or Reason("the remaining steps have no schedule")
+    kept = replace(times, deadlines={goal: by for goal, by in times.deadlines.items() if goal not in given_up})
+    dispatch = Dispatch(replace(problem, times=kept), found.plan, together.spread, same_actors=True)
+    return Remaining(dispatch, _paths(found.plan.plan.primitives, primitives), given_up)
+
+
+def dispatched(problem: Problem, primitives: Sequence[Step]) -> Dispatch:
+    """Return the dispatch of primitives from the initial state.
+
+    Raises
+    ------
+    ValueError
+        The primitives have no schedule: one of them isn't applicable in the state that the earlier primitives lead to.
+    """
+    found = remaining(problem, primitives, Fraction(0), Together())
+    if isinstance(found, Reason):
+        raise ValueError(found.text)
+    return found.dispatch
+
+
+def _scheduled(problem: Problem, plan: Plan) -> tuple[Timed, tuple[Symbol, ...]]:
+    """Schedule the primitives of a plan; give up no deadline, else one deadline, else all deadlines."""
+    times = problem.times or Times()
+    first = Timed()
+    for given_up in ((), *((goal,) for goal in times.deadlines), tuple(times.deadlines)):
+        kept = {goal: by for goal, by in times.deadlines.items() if goal not in given_up}
+        asked = replace(problem, times=replace(times, deadlines=kept))
+        searched = None if kept or times.windows else 0.0
+        found = in_time(asked, plan, searched, events=list(in_sequence(plan.primitives)))
+        if found.plan is not None:
+            return found, given_up
+        first = first if first.reason else found
+    return first, ()
+
+
+def _paths(scheduled: Sequence[Step], primitives: Sequence[Step]) -> tuple[tuple[int, ...], ...]:
+    """Return the path of each scheduled primitive: equal primitives have the same order in both sequences."""
+    places: Mapping[object, list[tuple[int, ...]]] = {_kind(step): [] for step in primitives}
+    for step in primitives:
+        places[_kind(step)].append(step.path)
+    return tuple(places[_kind(step)].pop(0) for step in scheduled)
+
+
+def _kind(step: Step) -> tuple[str, tuple[str, ...]]:
+    return step.behavior, step.arguments

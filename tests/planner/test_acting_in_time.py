@@ -1,0 +1,136 @@
+"""Execution of tasks with durations, deadlines and windows: all actors at once, dispatched by the temporal network."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from fractions import Fraction
+from functools import cache, partial
+from random import Random
+
+import pytest
+
+from confab.planner.acting.dispatching import Together, later
+from confab.planner.acting.episode import End, Episode, Event, Intervention, InterventionKind
+from confab.planner.acting.executive import act
+from confab.planner.acting.symbolic_world import SymbolicWorld
+from confab.planner.hierarchical.planner import plan
+from confab.planner.plan import Plan
+from confab.planner.timed.plan import Slot, TimedPlan
+from confab.planner.timed.validation import validate_timed
+from confab.reasoner.graph.knowledge import load
+from confab.reasoner.reading.problem import read
+from confab.reasoner.symbols import Fact, Problem, Symbol, Times
+
+FILLED, MOVED = Symbol("BEVERAGE", ("cup1",)), Symbol("LOCATION", ("cup2",))
+SERIAL = 32
+
+
+@cache
+def serving() -> Problem:
+    return read(load("beverage-serving")).problem
+
+
+@cache
+def planned() -> Plan:
+    found = plan(serving()).plan
+    assert found is not None
+    return found
+
+
+def with_times(**times: object) -> Problem:
+    return replace(serving(), times=Times(**times))  # type: ignore[arg-type]
+
+
+def acted(
+    problem: Problem,
+    *interventions: Intervention,
+    stretch: Callable[[Fraction], Fraction] = lambda expected: expected,
+    spread: Fraction = Fraction(0),
+    told: Callable[[Event], None] | None = None,
+) -> Episode:
+    world = SymbolicWorld(problem, stretch=stretch)
+    return act(problem, world, planned(), interventions, observer=told, together=Together(spread=spread))
+
+
+def executed(episode: Episode) -> TimedPlan:
+    """Return the executed primitives with their times."""
+    slots = {e.step.path: Slot(e.step, Fraction(e.begin), Fraction(e.end)) for e in episode.events}
+    return TimedPlan(episode.done, tuple(slots[step.path] for step in episode.done.primitives))
+
+
+def test_two_hands_take_two_thirds_of_the_time_of_one() -> None:
+    episode = acted(serving())
+    assert episode.status is End.REACHED
+    assert episode.seconds["simulated"] <= 0.7 * SERIAL
+    assert validate_timed(serving(), executed(episode), executed=True) == []
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_steps_that_take_up_to_thirty_percent_more_or_less_break_no_causal_link(seed: int) -> None:
+    rng = Random(seed)
+    episode = acted(
+        serving(), stretch=lambda seconds: seconds * Fraction(rng.randint(700, 1300), 1000), spread=Fraction(3, 10)
+    )
+    assert episode.status is End.REACHED
+    assert not episode.replans
+    assert validate_timed(serving(), executed(episode), executed=True) == []
+
+
+def test_a_hand_that_is_available_later_begins_later() -> None:
+    episode = acted(with_times(windows={"right_hand": ((Fraction(10), None),)}))
+    begins = [event.begin for event in episode.events if "right_hand" in event.step.arguments]
+    assert episode.status is End.REACHED
+    assert min(begins) == 10
+
+
+def test_a_deadline_that_no_schedule_keeps_is_given_up_at_the_beginning_and_the_others_are_kept() -> None:
+    told: list[Event] = []
+    problem = with_times(deadlines={FILLED: Fraction(5), MOVED: Fraction(20)})
+    episode = acted(problem, told=told.append)
+    assert [(event.seconds, event.text) for event in told if event.what == "late"] == [
+        (0, "the deadline of <cup1, BEVERAGE> can't be kept any more")
+    ]
+    assert episode.status is End.IMPOSSIBLE
+    (reason,) = episode.reasons
+    assert "cup1 BEVERAGE beverage1 is a goal by 5 s, and holds from 7 s on; this was known at 0 s" in reason.text
+    assert all(episode.observed[symbol] == value for symbol, value in serving().goal.items())
+
+
+def test_a_deadline_is_known_to_be_missed_when_a_step_has_taken_too_long() -> None:
+    told: list[Event] = []
+    first = iter([Fraction(20)])
+    episode = acted(
+        with_times(deadlines={FILLED: Fraction(20)}), stretch=lambda its: its * next(first, 1), told=told.append
+    )
+    late = next(event for event in told if event.what == "late")
+    reached = next(change.seconds for change in episode.course if change.symbol == FILLED)
+    assert late.seconds <= 20 < reached
+    assert episode.status is End.IMPOSSIBLE
+
+
+def test_a_deadline_that_is_kept_in_spite_of_an_intervention_is_reached() -> None:
+    change = partial(Intervention, InterventionKind.WORLD, (Fact(MOVED, "location8"),))
+    episode = acted(with_times(deadlines={FILLED: Fraction(30)}), change(at=3.5))
+    assert episode.status is End.REACHED
+    assert len(episode.replans) == 1
+    assert episode.seconds["simulated"] < len(episode.events)  # both hands go on at once
+
+
+def test_primitives_that_run_during_an_intervention_end_and_keep_their_effects() -> None:
+    change = Intervention(InterventionKind.WORLD, (Fact(MOVED, "location8"),), at=1.5)
+    episode = acted(serving(), change)
+    running = [event for event in episode.events if event.begin < 1.5 < event.end]
+    assert len(running) == 2
+    assert all(event.ok for event in running)
+
+
+def test_later_times_leave_out_what_is_over() -> None:
+    times = Times(
+        deadlines={FILLED: Fraction(12)},
+        windows={"a": ((Fraction(0), Fraction(5)), (Fraction(8), Fraction(20)), (Fraction(30), None))},
+        events={"DAWN": Fraction(4), "NOON": Fraction(12)},
+    )
+    assert later(times, Fraction(10)) == Times(
+        deadlines={FILLED: Fraction(2)},
+        windows={"a": ((Fraction(0), Fraction(10)), (Fraction(20), None))},
+        events={"NOON": Fraction(2)},
+    )
