@@ -305,7 +305,7 @@ def test_a_task_with_durations_is_executed_in_time_and_keeps_its_constraints(
     scene = confab.load(tmp_path / "ovens.ttl")
     for run in (scene.execute(), scene.execute(scene.plan(minimise="makespan"))):
         assert run.reached
-        assert run.violations == []
+        assert not run.violations
         assert run.summary().endswith(f"in {seconds:g} s")
     varied = [scene.execute(perturb=True, seed=seed).episode.seconds["simulated"] for seed in (1, 2, 2)]
     assert varied[0] != varied[1] == varied[2]
