@@ -332,8 +332,7 @@ def execute(
     caution : Caution, optional
         The knowledge that was learned from failures in earlier episodes.
     perturb : bool
-        With `seed`, vary poses, friction, masses and filled amounts in PyBullet at random, or the durations in a symbolic world by up
-        to 30 %.
+        Vary poses, friction, masses and filled amounts in PyBullet at random, with `seed`; in a symbolic world, vary durations.
     noise : float
         Standard deviation of perceived positions in PyBullet, in metres.
     both_hands : bool
