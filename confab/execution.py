@@ -14,7 +14,7 @@ from confab.accepting import AnyPlan, Facts, check_goal, check_noise, check_seco
 from confab.formats import EpisodeJson
 from confab.interchange import episode_json
 from confab.intervening import parse_interventions
-from confab.planner.acting.dispatching import Together
+from confab.planner.acting.dispatching import Concurrency
 from confab.planner.acting.episode import End, Episode, Event, Intervention, InterventionKind, situation
 from confab.planner.acting.executive import act
 from confab.planner.acting.failure_memory import Caution
@@ -353,7 +353,7 @@ def execute(
         raise KnowledgeError(f"noise of {noise:g} m: only in the world pybullet, since nothing is measured elsewhere")
     if both_hands and world not in WORLDS:
         raise KnowledgeError(f"both hands at once: only in the worlds {' and '.join(WORLDS)}")
-    together = Together(schedule, SPREAD if perturb else Fraction(0)) if both_hands or has_times(problem) else None
+    together = Concurrency(schedule, SPREAD if perturb else Fraction(0)) if both_hands or has_times(problem) else None
     if world == "symbolic":
         symbolic = SymbolicWorld(problem, stretch=_stretched(seed) if perturb else _as_expected)
         with possible():

@@ -24,7 +24,7 @@ SUBROOMS = {
     "grounded": set[str](),
     "hierarchical": {"grounded", "paper"},
     "experience": {"hierarchical"},
-    "acting": {"hierarchical"},
+    "acting": {"hierarchical", "timed"},
     "timed": {"grounded", "hierarchical"},
 }
 BARRED_FROM_PLANNER = {"rdflib", "pyoxigraph", "owlready2", "pyshacl", "reasonable", "pybullet", "pybullet_data"}

@@ -15,7 +15,7 @@ from confab.reasoner.symbols import Problem, Symbol, Times
 
 
 @dataclass(frozen=True)
-class Together:
+class Concurrency:
     """How several actors execute primitives at once.
 
     Attributes
@@ -68,7 +68,7 @@ def _open(
 
 
 def remaining(
-    problem: Problem, primitives: Sequence[Step], seconds: Fraction, together: Together
+    problem: Problem, primitives: Sequence[Step], seconds: Fraction, together: Concurrency
 ) -> Remaining | Reason:
     """Return the dispatch of primitives that are applicable one after another, or the reason why they have no schedule.
 
@@ -79,7 +79,7 @@ def remaining(
     primitives : sequence of Step
     seconds : Fraction
         The time since the beginning of the plan.
-    together : Together
+    together : Concurrency
         The schedule is used if it is a schedule of the primitives.
     """
     times = later(problem.times or Times(), seconds)
@@ -102,7 +102,7 @@ def dispatched(problem: Problem, primitives: Sequence[Step]) -> Dispatch:
     ValueError
         The primitives have no schedule: one of them isn't applicable in the state that the earlier primitives lead to.
     """
-    found = remaining(problem, primitives, Fraction(0), Together())
+    found = remaining(problem, primitives, Fraction(0), Concurrency())
     if isinstance(found, Reason):
         raise ValueError(found.text)
     return found.dispatch

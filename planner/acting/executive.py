@@ -22,7 +22,7 @@ from time import perf_counter
 
 from confab.planner.acting.agenda import Postponed, RemainingSteps, chains_of, tree_of, without
 from confab.planner.acting.belief import UNSEEN, Belief
-from confab.planner.acting.dispatching import Remaining, Together, remaining
+from confab.planner.acting.dispatching import Concurrency, Remaining, remaining
 from confab.planner.acting.episode import (
     End,
     Episode,
@@ -57,7 +57,7 @@ def act(
     retry_policy: RetryPolicy = DEFAULT,
     observer: Callable[[Event], None] | None = None,
     caution: Caution | None = None,
-    together: Together | None = None,
+    together: Concurrency | None = None,
 ) -> Episode:
     """Execute a task in a world until all goals are achieved, the task is proved impossible, or a limit is reached.
 
@@ -78,7 +78,7 @@ def act(
         Function that is called with every `Event`.
     caution : Caution, optional
         Failures in earlier episodes; unreliable facts and behaviours are avoided if there is an alternative.
-    together : Together, optional
+    together : Concurrency, optional
         Several actors execute primitives at once, until a primitive fails; the world must be `Concurrent`.
     """
     if caution is not None and plan is None:
@@ -129,7 +129,7 @@ class _RunningEpisode:
     planner: Planner | None
     retries: Retries
     observer: Callable[[Event], None] | None
-    together: Together | None
+    together: Concurrency | None
     going: bool = True
     goals: Postponed = field(default_factory=Postponed)
     requested: str = ""  # the reason for checking the agenda, if a check is requested

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from confab.planner.acting.dispatching import Together
+from confab.planner.acting.dispatching import Concurrency
 from confab.planner.acting.episode import End, Episode, Event, Intervention, InterventionKind
 from confab.planner.acting.executive import act
 from confab.planner.acting.failure_memory import Caution
@@ -542,7 +542,7 @@ def test_several_hands_reach_the_goals_after_any_intervention(
     position: int, inside: bool, change: Callable[..., Intervention]
 ) -> None:
     when = {"at": position * 22 / 32 + 0.2} if inside else {"after": planned().primitives[position].path}
-    episode = act(serving(), SymbolicWorld(serving()), planned(), [change("location8", **when)], together=Together())
+    episode = act(serving(), SymbolicWorld(serving()), planned(), [change("location8", **when)], together=Concurrency())
     assert episode.status is End.REACHED
     assert holds(episode)
     assert not episode.missed
@@ -552,7 +552,11 @@ def test_several_hands_reach_the_goals_after_any_intervention(
 def test_several_hands_begin_nothing_more_once_an_intervention_is_due() -> None:
     after = planned().primitives[5].path
     episode = act(
-        serving(), SymbolicWorld(serving()), planned(), [moved("cup2", "location8", after=after)], together=Together()
+        serving(),
+        SymbolicWorld(serving()),
+        planned(),
+        [moved("cup2", "location8", after=after)],
+        together=Concurrency(),
     )
     ((_, seconds),) = episode.interventions
     last = max(event.end for event in episode.events if event.begin < seconds)

@@ -8,7 +8,7 @@ from random import Random
 
 import pytest
 
-from confab.planner.acting.dispatching import Together, later
+from confab.planner.acting.dispatching import Concurrency, later
 from confab.planner.acting.episode import End, Episode, Event, Intervention, InterventionKind
 from confab.planner.acting.executive import act
 from confab.planner.acting.symbolic_world import SymbolicWorld
@@ -48,7 +48,7 @@ def acted(
     told: Callable[[Event], None] | None = None,
 ) -> Episode:
     world = SymbolicWorld(problem, stretch=stretch)
-    return act(problem, world, planned(), interventions, observer=told, together=Together(spread=spread))
+    return act(problem, world, planned(), interventions, observer=told, together=Concurrency(spread=spread))
 
 
 def executed(episode: Episode) -> TimedPlan:
