@@ -79,7 +79,6 @@ def test_an_execution_whose_goal_becomes_impossible_exits_with_1_and_the_reason(
         (["--intervene", "after=28 goal cup2 COLOUR red"], "unknown situation type 'COLOUR'"),
         (["--intervene", "at=1 cup2 LOCATION in_hand", "--world", "pybullet"], "can't be put at 'in_hand'"),
         (["--intervene", "after=28 left_hand HOLDS cup2", "--world", "pybullet"], "an intervention cannot make"),
-        (["--both-hands"], "only in the world pybullet"),
         (["--intervene", "after=28 cup9 LOCATION location8"], "did you mean 'cup"),
         (["--intervene", "after=28 remove cup9"], "did you mean 'cup"),
         (["--intervene", "after=28 remove cup1 cup2"], "one object; got 2"),
