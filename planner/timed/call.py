@@ -158,21 +158,24 @@ def in_time(
         found = shortest(order, network, choices, until, bound)
         if found is None:
             return Timed(reason=Reason("these steps have no schedule: they exclude each other's order"))
-        scheduler = "exchanges"
+        scheduler, every = "exchanges", [found]
         if found.begins.cost > (0, bound) and find_spec("ortools") is not None:
             from confab.planner.timed.cpsat import shorter
 
-            found, bound = shorter(order, network, choices, found, bound, until - perf_counter())
-            scheduler = "CP-SAT"
+            solved, bound = shorter(order, network, choices, found, bound, until - perf_counter())
+            scheduler, every = "CP-SAT", [found] if solved is found else [solved, found]
         proved = bound if proved is None else min(bound, proved)  # the first choices allow the most schedules
-        if found.begins.late:
-            return Timed(reason=_late(problem, order, network, choices, found), late=found.begins.late * network.unit)
-        timed = timed_plan(problem, plan, order, network, choices, found)
-        if timed is not None:
-            timed = replace(timed, bound=proved * network.unit, scheduler=scheduler, bounds=THESE_STEPS)
-            faults = validate_timed(problem, timed, separation)
-            if not faults:
-                return Timed(timed)
+        for found in every:
+            if found.begins.late:
+                return Timed(
+                    reason=_late(problem, order, network, choices, found), late=found.begins.late * network.unit
+                )
+            timed = timed_plan(problem, plan, order, network, choices, found)
+            if timed is not None:
+                timed = replace(timed, bound=proved * network.unit, scheduler=scheduler, bounds=THESE_STEPS)
+                faults = validate_timed(problem, timed, separation)
+                if not faults:
+                    return Timed(timed)
         if not choices.of and until:
             until = 0.0  # no search: the turns keep the plan's order
             continue
