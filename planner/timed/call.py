@@ -163,7 +163,7 @@ def in_time(
             from confab.planner.timed.cpsat import shorter
 
             solved, bound = shorter(order, network, choices, found, bound, until - perf_counter())
-            scheduler, every = "CP-SAT", [found] if solved is found else [solved, found]
+            scheduler, every = "CP-SAT", [solved] if solved is found or found.begins.late else [solved, found]
         proved = bound if proved is None else min(bound, proved)  # the first choices allow the most schedules
         for found in every:
             if found.begins.late:
