@@ -148,7 +148,7 @@ def test_steps_are_given_to_another_hand_only_if_it_reaches_the_places_of_the_up
     assert found is not None
     timed = in_time(problem, found).plan
     assert timed is not None
-    assert [timed.makespan, timed.bound] == [Fraction(30), Fraction(30)]
+    assert [timed.makespan, timed.bound] == [Fraction(24), Fraction(24)]
 
 
 def test_the_checker_rejects_an_actor_of_a_variable_that_is_in_two_steps_at_once() -> None:
