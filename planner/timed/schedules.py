@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import chain, pairwise
+from itertools import chain, islice, pairwise
 from math import inf
 from time import perf_counter
 
@@ -76,12 +76,12 @@ def shortest(
         The network of `order`.
     choices : ActorChoices
     until : float
-        The end of the search on the clock of `perf_counter`.
+        The end of the search on the clock of `perf_counter`; 0 keeps the order of the sequence.
     bound : int
         A lower bound on the makespan.
     """
     search = _ScheduleSearch(order, network, choices)
-    starts = [search.evaluated(turns) for turns in search.starts()]
+    starts = [search.evaluated(turns) for turns in islice(search.starts(), None if until else 1)]
     found = [start for start in starts if start is not None]
     if not found:
         return None
