@@ -118,7 +118,7 @@ WORDS: Mapping[str, str] = {
     "execute": "act step Agent dispatch perform tick Runner episode replay Executive Controller pick place grasp pour navigate "
     "drive apply do play loop spin go monitor progress send control transition reset done deploy ros publish call successor "
     "completed started restart rerun repeat retry carry real lookahead resume run_scene execute_plan rollout_plan run_plan "
-    "BehaviorTree move_base do_action apply_action perform_action perform_plan run_on_robot current_step simulate_steps "
+    "move_base do_action apply_action perform_action perform_plan run_on_robot current_step simulate_steps "
     "continue_ through",
     "picture": "draw show plot render image visualise visualize view display viz map screenshot thumbnail diagram viewer figure "
     "svg preview sketch to_png print_map",
@@ -241,6 +241,7 @@ HINTS: Mapping[str, Mapping[str, str]] = {
         "scene.owl": "onto_path",
         "scene.board()": "edit",
         "__version__": "version",
+        "confab export SCENE --bt (in a shell)": "BehaviorTree BehaviourTree bt btcpp py_trees behavior_tree",
         "confab --help (in a shell)": "main cli commands",
         "confab fetch URL (in a shell)": "fetch download pull",
         "scene.embodiment.robots": "Arm robot",
@@ -319,13 +320,14 @@ HINTS: Mapping[str, Mapping[str, str]] = {
         "execute().episode.course": "states trajectory state_sequence state_history",
         "dearer()": "warning hints suggestions cheaper is_cheapest",
         "plan.to_records()": "records list to_records",
-        "confab export SCENE --bt (in a shell)": "behavior_tree export_bt",
+        "confab export SCENE --bt (in a shell)": "behavior_tree export_bt to_behavior_tree to_xml",
         "outcome.engine": "planner solver engine_name",
         "plan.walk()": "walk_steps all_steps",
         "json()": "serialize serialise model_dump",
         "execute()": "run start",
         "scene.plan(GOALS)": "again next",
         "outcome.bound": "is_optimal is_best",
+        "why(STEP), or explain()": "explanation",
     },
     "plan": {
         "result.purposes": "constraints dependencies ordering causal_links adjacency_list",
@@ -534,7 +536,7 @@ OPTIONS = {
     "goals goal": "target task objective goal_state set_goal targets new_goal want desired goal_facts tasks to_achieve",
     "memory": "experience knowledge model learned mem use_memory memory_file with_memory checkpoint weights learned_from use",
     "no_memory": "without_memory no_learning fresh memoryless",
-    "mode engine": "planner",
+    "engine mode": "planner",
     "engine": "solver backend heuristic search_engine up_engine planner_name fast_downward external algorithm search use",
     "mode": "strategy algorithm alias method search_mode policy config variant heuristic search",
     "optimal minimise": "optimise optimize best shortest cost_optimal anytime optimality minimum_cost cheapest "
