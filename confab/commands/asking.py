@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import click
 from click.exceptions import Exit
 
+from confab.commands.given import QUERY as A_QUERY
 from confab.commands.given import load_scene
-from confab.commands.misplaced import QUERY as A_QUERY
 from confab.commands.options import (
     AS_JSON,
     PATH,

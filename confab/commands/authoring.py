@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import click
 from click.exceptions import Exit
 
-from confab.commands.misplaced import PDDL
-from confab.commands.misplaced import SCENE as A_SCENE
+from confab.commands.given import PDDL
+from confab.commands.given import SCENE as A_SCENE
 from confab.commands.options import (
     AS_JSON,
     GOALS,

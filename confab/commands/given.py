@@ -14,6 +14,10 @@ from confab.reasoner.files import STDOUT
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.terminal import remark
 
+SCENE, PDDL, QUERY, FACT, INTERVENTION, NUMBER = "a scene", "PDDL", "a query", "a fact", "an intervention", "a number"
+IRI = "an IRI"
+"""The kinds of values that arguments and options take, beside the kinds of files in `confab.reasoner.kinds`."""
+
 if TYPE_CHECKING:
     from confab.memory import Memory
     from confab.planner.plan import Outcome, Plan

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import click
 from click.exceptions import Exit
 
+from confab.commands.given import SCENE as A_SCENE
 from confab.commands.given import load_scene
-from confab.commands.misplaced import SCENE as A_SCENE
 from confab.commands.misplaced import kind_of_value, known_as
 from confab.commands.options import AS_JSON, QUIET, TIME_LIMIT, Command, Input, Output, Text, command, scene_names
 from confab.examples import examples

@@ -17,10 +17,9 @@ from shlex import quote
 import click
 
 from confab import ontology
+from confab.commands.given import FACT, INTERVENTION, NUMBER, PDDL, QUERY, SCENE
 from confab.reasoner.kinds import EPISODE, FILM, MEMORY, OBSERVED, PICTURE, PLAN, REPORT, VERDICTS, kind_of
 
-SCENE, PDDL, QUERY, FACT, INTERVENTION, NUMBER = "a scene", "PDDL", "a query", "a fact", "an intervention", "a number"
-IRI = "an IRI"
 OF_FILES = {PDDL: "PDDL", SCENE: "scene|ontology|XML document"} | {
     kind: kind for kind in (PLAN, VERDICTS, EPISODE, MEMORY, OBSERVED, REPORT, PICTURE, FILM)
 }

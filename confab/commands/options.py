@@ -12,8 +12,8 @@ from typing import Any
 import click
 
 from confab import ontology
-from confab.commands.misplaced import FACT, IRI, correction, kind_of_value, taken
-from confab.commands.misplaced import SCENE as A_SCENE
+from confab.commands.given import FACT, IRI
+from confab.commands.given import SCENE as A_SCENE
 from confab.reasoner.files import STDOUT
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.kinds import CONVERTED, EPISODE, GENERATED, IMPORTED, MEMORY, PLAN, VERDICTS
@@ -25,7 +25,7 @@ STDIN = Path("/dev/stdin")
 
 
 class Text(click.types.StringParamType):
-    """A text of a kind of `confab.commands.misplaced`, for example a goal, or the name of a scene."""
+    """A text of a kind of `confab.commands.given`, for example a goal, or the name of a scene."""
 
     def __init__(self, kind: str) -> None:
         self.kind = kind
@@ -91,6 +91,8 @@ class Command(click.Command):
             error.ctx = error.ctx or ctx
             missing = isinstance(error, click.MissingParameter)
             if type(error) is click.UsageError or missing:
+                from confab.commands.misplaced import correction
+
                 right = correction(ctx, ctx.meta[GIVEN], missing)
                 said = [error.format_message().rstrip(".")] if missing or not right else []
                 raise click.UsageError("; ".join([*said, *([right] if right else [])]), ctx) from error
@@ -120,6 +122,8 @@ class Command(click.Command):
                 raise KnowledgeError("wanted a scene")
             return super().invoke(ctx)
         except KnowledgeError as error:
+            from confab.commands.misplaced import correction
+
             if right := correction(ctx, ctx.meta[GIVEN], known=True):
                 said = f"{error}; " * (len(str(error)) <= SHORT)
                 raise KnowledgeError(said + right) from error
@@ -136,7 +140,11 @@ def _is_no_scene(parameter: click.Parameter, given: object) -> bool:
     """Return whether a scene is wanted and a file of Confab with another kind of content is given."""
     values = given if isinstance(given, tuple) else (given,)
     named = [value for value in values if isinstance(value, str) and value.endswith(".json")]
-    return taken(parameter) == A_SCENE and any(kind_of_value(value) not in ("", A_SCENE) for value in named)
+    if not named or getattr(parameter.type, "kind", "") != A_SCENE:
+        return False
+    from confab.commands.misplaced import kind_of_value
+
+    return any(kind_of_value(value) not in ("", A_SCENE) for value in named)
 
 
 def _reads_stdin(given: object, parameter: click.Parameter) -> bool:

@@ -10,9 +10,17 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.exceptions import Exit
 
-from confab.commands.given import blame_reach, json_file, load_scene, memory_for, plan_in, warn_of_errors
-from confab.commands.misplaced import FACT, INTERVENTION
-from confab.commands.misplaced import SCENE as A_SCENE
+from confab.commands.given import (
+    FACT,
+    INTERVENTION,
+    blame_reach,
+    json_file,
+    load_scene,
+    memory_for,
+    plan_in,
+    warn_of_errors,
+)
+from confab.commands.given import SCENE as A_SCENE
 from confab.commands.options import (
     AS_JSON,
     GOALS,
