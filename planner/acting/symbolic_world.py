@@ -90,7 +90,7 @@ class SymbolicWorld:
     def execute_together(
         self, dispatch: Dispatch, may_begin: Callable[[Set[int]], bool]
     ) -> list[tuple[WorkerSlot, WorldReport]]:
-        """Execute the primitives of a dispatch; an intervention stops a primitive if its conditions don't hold until its end."""
+        """Execute the primitives of a dispatch; an intervention stops the primitives that read or change a changed fact."""
         start, now = Fraction(self.seconds), Fraction(0)
         course = StepSimulation(replace(self.problem, initial=self.state), list(map(dispatch.step, dispatch.waiting)))
         running, ended = list[tuple[Fraction, int, Fraction]](), dict[int, tuple[WorkerSlot, WorldReport]]()
@@ -122,7 +122,10 @@ class SymbolicWorld:
                 self.state = course.facts.state()
                 self._disturbed_by_the_clock()
                 now = max(now, Fraction(self.seconds) - start)
-                course.change(replace(self.problem, initial=self.state))
+                stopped = course.change(self.state)
+                for _, number, begin in [one for one in running if one[1] in stopped]:
+                    report(number, begin, _interrupted(course.steps[number]))
+                running = sorted(one for one in running if one[1] not in stopped)
                 continue
             now = min(times)
             self.seconds = float(start + now)
@@ -134,10 +137,8 @@ class SymbolicWorld:
         return sorted(ended.values(), key=lambda one: (one[0].begin, one[0].position))
 
     def _ended(self, course: StepSimulation, number: int) -> WorldReport:
-        """Make the effects of the end of a primitive, unless an intervention or a fault prevents them."""
+        """Make the effects of the end of a primitive, unless a fault prevents them."""
         step = course.steps[number]
-        if not course.still_possible(number):
-            return WorldReport(False, INTERRUPTED, step.arguments, "its precondition was lost in the meantime")
         fault = self._fault(step, course.facts.state()) if self._fault is not None else None
         if fault is not None:
             return fault
@@ -221,6 +222,10 @@ class SymbolicWorld:
         self.problem = met(self.problem, found)
         self._news.append(found)
         self.state[symbol] = name
+
+
+def _interrupted(step: Step) -> WorldReport:
+    return WorldReport(False, INTERRUPTED, step.arguments, "an intervention changed a fact on which it depends")
 
 
 def _inapplicable(step: Step, why: str) -> WorldReport:

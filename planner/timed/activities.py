@@ -17,7 +17,7 @@ from confab.planner.plan import Step
 from confab.planner.timed.pieces import Pieces, actors_of, default_actors, duration_of, pieces_of, terms_at
 from confab.planner.validation import BehaviorReader, Cell, LoggedState
 from confab.reasoner.limits import check
-from confab.reasoner.symbols import Behavior, Problem, Times
+from confab.reasoner.symbols import Behavior, Problem, State, Times
 
 ReadAccess: TypeAlias = "tuple[str, object]"
 """A read access: the value of a symbol (situation type and arguments), or all symbols of a situation type with a given value."""
@@ -180,18 +180,16 @@ class StepSimulation:
             self.facts.put(*cell, after)
         self.made[number]["end"] = self.done(self.steps[number], self.piece(number).end, self.terms[number], True)
 
-    def still_possible(self, number: int) -> bool:
-        """Return whether the conditions that a begun step requires throughout hold now."""
-        try:
-            self.done(self.steps[number], self.piece(number).held, self.terms[number], False)
-        except InapplicableError:
-            return False
-        return True
-
-    def change(self, problem: Problem) -> None:
-        """Continue in the initial state of a problem; the steps in progress keep the effects that their begins determined."""
-        self.problem, self.rules = problem, BehaviorReader(problem)
-        self.facts = ReadRecorder(problem, self.rules)
+    def change(self, state: State) -> set[int]:
+        """Continue in another state; return the begun steps that read or change a symbol whose value differs in this state."""
+        before, self.facts = self.facts.state(), ReadRecorder(replace(self.problem, initial=state), self.rules)
+        keys = set[ReadAccess]()
+        for symbol in before.keys() | state.keys():
+            if before.get(symbol) != state.get(symbol):
+                keys.add((symbol.situation, symbol.arguments))
+                keys |= {(symbol.situation, value) for value in (before.get(symbol), state.get(symbol))}
+        begun = [number for number, made in enumerate(self.made) if made]
+        return {n for n in begun if any(keys & {*one.reads, *one.changes} for one in self.made[n].values())}
 
     def done(self, step: Step, piece: Behavior, terms: Arguments, put: bool) -> Access:
         """Return the reads and changes of a part of a step; if `put` is true, make the changes."""

@@ -134,3 +134,17 @@ def test_later_times_leave_out_what_is_over() -> None:
         windows={"a": ((Fraction(0), Fraction(10)), (Fraction(20), None))},
         events={"NOON": Fraction(2)},
     )
+
+
+@pytest.mark.parametrize(("at", "stopped"), [(4.2, 0), (8.2, 1), (9.2, 0), (10.2, 1), (16.2, 1)])
+def test_an_intervention_stops_the_primitives_that_depend_on_a_changed_fact_and_the_goals_are_reached(
+    at: float, stopped: int
+) -> None:
+    """The left hand holds cup 2 when the cup is moved at 8.2 s, so the left hand stops and the right hand goes on."""
+    episode = acted(serving(), Intervention(InterventionKind.WORLD, (Fact(MOVED, "location8"),), at=at))
+    running = [event for event in episode.events if event.begin < at < event.begin + 1]
+    interrupted = [event for event in running if event.code == "interrupted"]
+    assert len(interrupted) == stopped
+    assert all(event.end == pytest.approx(at) and "left_hand" in event.step.arguments for event in interrupted)
+    assert all(event.ok for event in running if event not in interrupted)
+    assert episode.status is End.REACHED
