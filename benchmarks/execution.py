@@ -389,7 +389,6 @@ def _is_source(problem: Problem, step: Step) -> bool:
 
 def both_hands() -> None:
     """Print the makespans of execution with both hands and of serial execution, and draw a Gantt chart."""
-    from confab.planner.acting.dispatching import dispatched
     from confab.sim.together import perform_together
     from confab.sim.verify import expectations, verify
     from confab.sim.world import PhysicsWorld
@@ -400,7 +399,7 @@ def both_hands() -> None:
     promised = expectations(scene.problem, steps)
     serial = verify(scene.embodiment, scene.problem.initial, steps, promised)
     with PhysicsWorld(scene.embodiment, scene.problem.initial) as world:
-        performed = perform_together(world, dispatched(scene.problem, steps))
+        performed = perform_together(world, scene.problem, steps)
         seconds, seen = world.seconds, world.observe()
     same = all(promised[-1].get(symbol) == value for symbol, value in seen.items())
     ratio = seconds / serial.simulated_seconds

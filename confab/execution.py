@@ -306,7 +306,7 @@ def execute(
 ) -> Execution:
     """Execute a task in a closed loop of action and observation.
 
-    A task with durations, deadlines or windows is executed by all actors at once.
+    In a symbolic world, a task with durations, deadlines or windows is executed by all actors at once.
 
     Parameters
     ----------
@@ -353,7 +353,8 @@ def execute(
         raise KnowledgeError(f"noise of {noise:g} m: only in the world pybullet, since nothing is measured elsewhere")
     if both_hands and world not in WORLDS:
         raise KnowledgeError(f"both hands at once: only in the worlds {' and '.join(WORLDS)}")
-    together = Concurrency(schedule, SPREAD if perturb else Fraction(0)) if both_hands or has_times(problem) else None
+    in_time = both_hands or (world == "symbolic" and has_times(problem))
+    together = Concurrency(schedule, SPREAD if perturb else Fraction(0)) if in_time else None
     if world == "symbolic":
         symbolic = SymbolicWorld(problem, stretch=_stretched(seed) if perturb else _as_expected)
         with possible():

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from confab.accepting import AnyPlan, plan_of
 from confab.physics import require_skills
-from confab.planner.acting.dispatching import dispatched
 from confab.reasoner.files import write_whole
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.kinds import TRAJECTORIES, stamped
@@ -67,7 +66,7 @@ def trajectories(scene: Scene, plan: AnyPlan | None = None, seed: int = 0, both_
         expected = expectations(scene.problem, steps)
         if both_hands:
             with PhysicsWorld(embodiment, initial, seed, watch=recorder) as world:
-                done = perform_together(world, dispatched(scene.problem, steps))
+                done = perform_together(world, scene.problem, steps)
             verdicts = list(zip((slot.step for slot in done.slots), done.verdicts, strict=True))
             slots = [(one.step, one.begin, one.end) for one in done.slots]
         else:

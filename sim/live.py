@@ -125,6 +125,7 @@ class LiveWorld:
     ) -> list[tuple[WorkerSlot, Verdict]]:
         """Execute the primitives of a dispatch with all hands at once; return those that ended, in the order of their begins.
 
+        A primitive begins when its predecessors have ended and no other hand works too near.
         An intervention stops the running primitives of the objects that it changes; the other running primitives end.
         """
         self.changed = set()
@@ -134,7 +135,14 @@ class LiveWorld:
             return now
 
         try:
-            done = perform_together(self.world, dispatch, may_begin=may_begin, changed=changed)
+            steps = [replace(dispatch.step(number), path=(number,)) for number in dispatch.waiting]
+            done = perform_together(
+                self.world,
+                dispatch.problem,
+                steps,
+                may_begin=lambda paths: may_begin({path[0] for path in paths}),
+                changed=changed,
+            )
         finally:
             self.changed = None
         if not done.ok:

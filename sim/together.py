@@ -7,18 +7,17 @@ fixed order, so that equal calls give equal results.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Set
+from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass
-from fractions import Fraction
 from threading import Semaphore, Thread
 
 import numpy as np
 import pybullet
 
-from confab.planner.acting.schedule import WorkerSlot
+from confab.planner.acting.schedule import WorkerSlot, partial_order, ready, urgency_of, worker_of, workers_of
 from confab.planner.acting.world import INTERRUPTED
 from confab.planner.plan import Step
-from confab.planner.timed.dispatch import Dispatch
+from confab.reasoner.symbols import Problem
 from confab.sim.engine import Engine
 from confab.sim.verdict import SkillError, Verdict
 from confab.sim.world import PhysicsWorld
@@ -89,38 +88,43 @@ class _RunningPrimitive:
 
 def perform_together(
     world: PhysicsWorld,
-    dispatch: Dispatch,
+    problem: Problem,
+    primitives: Sequence[Step],
     room: float = ROOM,
     most: float = 600.0,
-    may_begin: Callable[[Set[int]], bool] = lambda done: True,
+    may_begin: Callable[[Set[tuple[int, ...]]], bool] = lambda done: True,
     changed: Callable[[], Set[str]] = frozenset,
 ) -> Performance:
-    """Execute primitives with all hands at once; each begins when it is dispatched and no other hand works too near.
+    """Execute primitives with all hands at once; each starts when its predecessors are done and no other hand works too near.
 
     Parameters
     ----------
     world : PhysicsWorld
-    dispatch : Dispatch
-        The dispatch of the primitives, from the present state of the world.
+    problem : Problem
+        The problem, whose initial state is the state of the world.
+    primitives : sequence of Step
     room : float
         Minimum distance in metres between the places at which two hands work at the same time.
     most : float
         Simulated seconds after which the execution is given up.
     may_begin : callable
-        Function of the numbers of the finished primitives that returns whether further primitives may begin.
+        Function of the paths of the finished primitives that returns whether further primitives may begin.
     changed : callable
         Function that returns the individuals that an intervention has changed since the last call. Running primitives of these
         individuals are interrupted.
     """
-    start = world.seconds
-    primitives = [dispatch.step(number) for number in dispatch.waiting]
+    order, workers = partial_order(problem, primitives), workers_of(problem)
+    urgency = urgency_of(order)
     where = [_workplace(world, step) for step in primitives]
-    flowing = [world.embodiment.skills[step.behavior].skill in FLOWING for step in primitives]
+    index = {id(step): i for i, step in enumerate(primitives)}
 
-    def apart(one: int, other: int) -> bool:
-        if flowing[one] and flowing[other]:
+    def flowing(step: Step) -> bool:
+        return world.embodiment.skills[step.behavior].skill in FLOWING
+
+    def apart(one: Step, other: Step) -> bool:
+        if flowing(one) and flowing(other):
             return False
-        here, there = where[one](), where[other]()
+        here, there = where[index[id(one)]](), where[index[id(other)]]()
         return here is None or there is None or float(np.linalg.norm(here - there)) >= room
 
     step_once, jobs, current = world.run, list[_RunningPrimitive](), list[_RunningPrimitive]()
@@ -134,14 +138,12 @@ def perform_together(
     world.run = wait_for  # type: ignore[method-assign]
     try:
         while len(done) < len(primitives) and world.seconds < most:
-            now, going_on = Fraction(world.seconds - start), all(verdict.ok for _, verdict in done.values())
-            if going_on:
-                for number in dispatch.ready(now):
-                    if all(apart(number, job.position) for job in jobs) and may_begin(done.keys()):
-                        dispatch.begin(number, now)
-                        worker = "".join(dispatch.order.activities[number].actors[:1])
-                        jobs.append(_RunningPrimitive(world, primitives[number], number, worker))
-            if not jobs and (not going_on or dispatch.wakes(now) is None):
+            if all(verdict.ok for _, verdict in done.values()):
+                running = [job.position for job in jobs]
+                new = ready(order, primitives, workers, [*done, *running], running, urgency, apart)
+                if new and may_begin({slot.step.path for slot, _ in done.values()}):
+                    jobs += [_RunningPrimitive(world, primitives[i], i, worker_of(primitives[i], workers)) for i in new]
+            if not jobs:
                 break
             for job in list(jobs):
                 for other in jobs:
@@ -154,7 +156,6 @@ def perform_together(
                 if job.verdict is not None:
                     slot = WorkerSlot(job.step, job.position, job.worker, job.begin, world.seconds)
                     done[job.position] = slot, job.verdict
-                    dispatch.end(job.position, Fraction(world.seconds - start))
                     jobs.remove(job)
             step_once(1)
             moved = changed()

@@ -309,7 +309,7 @@ def verify(
     "--perturb", is_flag=True, help="Vary poses, friction, masses, filled amounts; durations without physics."
 )
 @NOISE
-@click.option("--both-hands", is_flag=True, help="Execute with all hands at once; tasks with times always are.")
+@click.option("--both-hands", is_flag=True, help="Execute with all hands at once.")
 @click.option("--learn", is_flag=True, help="Learn from the episode and its failures into --memory.")
 @TIME_LIMIT
 @click.option(

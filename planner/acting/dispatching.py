@@ -94,20 +94,6 @@ def remaining(
     return Remaining(dispatch, _paths(found.plan.plan.primitives, primitives), given_up)
 
 
-def dispatched(problem: Problem, primitives: Sequence[Step]) -> Dispatch:
-    """Return the dispatch of primitives from the initial state.
-
-    Raises
-    ------
-    ValueError
-        The primitives have no schedule: one of them isn't applicable in the state that the earlier primitives lead to.
-    """
-    found = remaining(problem, primitives, Fraction(0), Concurrency())
-    if isinstance(found, Reason):
-        raise ValueError(found.text)
-    return found.dispatch
-
-
 def _scheduled(problem: Problem, plan: Plan) -> tuple[Timed, tuple[Symbol, ...]]:
     """Schedule the primitives of a plan; give up no deadline, else one deadline, else all deadlines."""
     times = problem.times or Times()

@@ -1,4 +1,4 @@
-"""The necessary partial order of a plan's primitives.
+"""Concurrent execution: the necessary partial order of a plan's primitives, and a schedule that respects this order.
 
 Most of the order of a sequential plan is arbitrary. A primitive must wait for an earlier primitive only if an exchange
 of both primitives would make one primitive inapplicable or change its effects. The test executes the behaviours, so the
@@ -7,7 +7,7 @@ test covers all kinds of conditions.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -18,6 +18,8 @@ from confab.planner.validation import followed
 from confab.reasoner.symbols import Problem, State, Symbol
 
 PartialOrder: TypeAlias = "networkx.DiGraph[int]"
+Compatible = Callable[[Step, Step], bool]
+"""Function of two primitives that returns whether both can be executed at the same time in the available room."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,39 @@ def workers_of(problem: Problem) -> frozenset[str]:
     """Return the workers, who execute one primitive at a time: individuals with a situation type that has a rest value."""
     kinds = {s.arguments[0] for s in problem.domain.situations.values() if s.rest is not None and s.arguments}
     return frozenset(individual for kind in kinds for individual in problem.classes.get(kind, ()))
+
+
+def ready(
+    order: PartialOrder,
+    primitives: Sequence[Step],
+    workers: Iterable[str],
+    begun: Iterable[int],
+    running: Sequence[int],
+    urgency: Mapping[int, float],
+    apart: Compatible,
+) -> list[int]:
+    """Return the primitives that can begin now and together, the most urgent first."""
+    started, chosen = set(begun), list(running)
+    busy = {worker_of(primitives[i], workers) for i in running}
+    found = []
+    open_ = [
+        i for i in order if i not in started and all(p in started and p not in chosen for p in order.predecessors(i))
+    ]
+    for i in sorted(open_, key=lambda i: (-urgency[i], i)):
+        worker = worker_of(primitives[i], workers)
+        if worker not in busy and all(apart(primitives[i], primitives[other]) for other in chosen):
+            found.append(i)
+            chosen.append(i)
+            busy.add(worker)
+    return found
+
+
+def urgency_of(order: PartialOrder) -> dict[int, float]:
+    """Return for each primitive the number of primitives in the longest chain that begins with this primitive."""
+    found: dict[int, float] = {}
+    for i in reversed(list(networkx.topological_sort(order))):
+        found[i] = 1.0 + max((found[j] for j in order.successors(i)), default=0.0)
+    return found
 
 
 def worker_of(step: Step, workers: Iterable[str]) -> str:

@@ -1,4 +1,4 @@
-"""The necessary partial order of a plan."""
+"""The necessary partial order of a plan, and execution with both hands at once."""
 
 from functools import cache
 
@@ -7,13 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from confab.planner.acting.schedule import PartialOrder, partial_order, worker_of
+from confab.planner.acting.schedule import PartialOrder, partial_order, ready, urgency_of, worker_of
 from confab.planner.hierarchical.planner import plan
 from confab.planner.plan import Plan, Step
 from confab.planner.validation import validate
 from confab.reasoner.graph.knowledge import load
 from confab.reasoner.reading.problem import read
 from confab.reasoner.symbols import Problem
+from tests.planner.slots import schedule
 
 
 @cache
@@ -31,6 +32,25 @@ def planned() -> Plan:
 @cache
 def needed() -> PartialOrder:
     return partial_order(serving(), planned().primitives)
+
+
+def test_both_hands_take_at_most_three_quarters_of_the_time_of_one() -> None:
+    slots = schedule(serving(), planned().primitives)
+    assert len(slots) == 32
+    assert max(slot.end for slot in slots) <= 0.75 * 32
+
+
+def test_no_hand_does_two_things_at_once() -> None:
+    slots = schedule(serving(), planned().primitives)
+    for one in slots:
+        for other in slots:
+            if one is not other and one.worker == other.worker:
+                assert one.end <= other.begin or other.end <= one.begin
+
+
+def test_a_schedule_is_sequential_if_no_two_steps_may_overlap() -> None:
+    slots = schedule(serving(), planned().primitives, apart=lambda one, other: False)
+    assert max(slot.end for slot in slots) == 32
 
 
 @given(st.randoms(use_true_random=False))
@@ -58,9 +78,41 @@ def step(name: str, *arguments: str) -> Step:
     return Step((0,), 0, 1, name, arguments)
 
 
+FORK: PartialOrder = networkx.DiGraph([(0, 1), (1, 2), (0, 3)])
+
+
+def test_the_urgency_of_a_step_is_the_duration_of_the_longest_chain_behind_it() -> None:
+    assert urgency_of(FORK) == {0: 3.0, 1: 2.0, 2: 1.0, 3: 1.0}
+
+
+def begin(begun: set[int], running: list[int], urgency: dict[int, float], room: bool = True) -> list[int]:
+    steps = [step("A", "left"), step("B", "left"), step("C", "right"), step("D", "right")]
+    return ready(FORK, steps, ["left", "right"], begun, running, urgency, lambda one, other: room)
+
+
+def test_a_step_begins_when_all_before_it_has_ended_the_most_urgent_first() -> None:
+    urgency = urgency_of(FORK)
+    assert begin(set(), [], urgency) == [0]
+    assert begin({0}, [0], urgency) == []
+    assert begin({0}, [], urgency) == [1, 3]
+    assert begin({0}, [], {**urgency, 3: 9.0}) == [3, 1]
+    assert begin({0}, [], urgency, room=False) == [1]
+    assert begin({0, 1}, [1], urgency) == [3]
+    assert begin({0, 1, 3}, [3], urgency) == []
+
+
 def test_the_worker_of_a_step_is_the_first_worker_among_its_arguments() -> None:
     assert worker_of(step("GIVE", "cup1", "right", "left"), ["left", "right"]) == "right"
     assert worker_of(step("WAIT", "cup1"), frozenset(["left"])) == ""
+
+
+def test_a_schedule_has_the_given_durations_and_slots_sorted_by_begin() -> None:
+    primitives = planned().primitives
+    slow = {i: 1.0 + i % 3 for i in range(len(primitives))}
+    slots = schedule(serving(), primitives, slow)
+    assert all(slot.end - slot.begin == slow[slot.position] for slot in slots)
+    assert [slot.begin for slot in slots] == sorted(slot.begin for slot in slots)
+    assert schedule(serving(), ()) == []
 
 
 def test_the_partial_order_labels_its_steps_and_refuses_inapplicable_steps() -> None:
