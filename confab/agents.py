@@ -105,6 +105,12 @@ def server(folder: Path) -> MCPServer[Any]:
 
         async def call_tool(self, name: str, arguments: dict[str, Any], context: Any = None) -> Any:
             """Call a tool by name with arguments."""
+            known = {tool.name: [*tool.input_schema["properties"]] for tool in await self.list_tools()}.get(name)
+            unknown = [one for one in arguments if known is not None and one not in known]
+            if unknown:
+                raise ToolError(
+                    f"{name}: no argument '{unknown[0]}'; wanted {', '.join(known or ()) or 'none'}"[:SHOWN]
+                )
             try:
                 return await super().call_tool(name, arguments, context)
             except ToolError as error:

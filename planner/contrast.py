@@ -15,7 +15,7 @@ from itertools import product
 from operator import eq
 
 from confab.planner.causal_links import on_level
-from confab.planner.checked_conditions import Bindings
+from confab.planner.checked_conditions import Bindings, variables
 from confab.planner.levels import failing_conditions
 from confab.planner.plan import Outcome, Plan, Reason, Step, renumbered
 from confab.planner.plan_costs import cost_of
@@ -28,8 +28,10 @@ from confab.reasoner.symbols import (
     Condition,
     EqualityCondition,
     Problem,
+    RelationCondition,
     State,
     Symbol,
+    ValueCondition,
     substituted,
 )
 
@@ -92,11 +94,18 @@ def instead_of(
             if one.behavior == behavior.name and given.items() <= _terms(behavior, one.arguments).items():
                 return Contrast(before, behavior.name, one.arguments, course[i])
     possible: list[tuple[int, tuple[str, ...]]] = []
+    positive = [
+        c for c in behavior.preconditions if isinstance(c, ValueCondition | RelationCondition) and not c.negated
+    ]
+    known = given.keys() | set[str]().union(*map(variables, positive))
+    free = [p for p in behavior.parameters if p.name not in known]  # no condition determines these parameters
     for i in places:
-        found = rules.satisfied(behavior.preconditions, given, behavior.kinds, LoggedState(problem, states[i]))
-        if found is not None:  # a parameter that no condition determines takes each member of its class
-            taken = ((found[p.name],) if p.name in found else problem.members(p.kind) for p in behavior.parameters)
-            possible += [(i, arguments) for arguments in product(*taken)]
+        facts = LoggedState(problem, states[i])
+        for chosen in product(*(problem.members(p.kind) for p in free)):
+            terms = {**given, **{p.name: one for p, one in zip(free, chosen, strict=True)}}
+            found = rules.satisfied(behavior.preconditions, terms, behavior.kinds, facts)
+            if found is not None:
+                possible.append((i, tuple(found[p.name] for p in behavior.parameters)))
     if not possible:
         return _fewest_failures(rules, behavior, given, [(course[i], states[i]) for i in places], before)
     doable = [(i, a) for i, a in possible if successor(problem, behavior, a, states[i]) is not None]

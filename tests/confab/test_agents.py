@@ -66,6 +66,8 @@ async def something_else_is_compared(client: Any) -> None:
     assert await said(client, "why_not", scene=SCENE, instead=GOAL)
     text = await said(client, "why_not", refused=True, scene=SCENE)
     assert text == "why_not: wrong arguments: instead: missing"
+    text = await said(client, "plan", refused=True, scene=SCENE, goal=[GOAL])
+    assert text == "plan: no argument 'goal'; wanted scene, goals, mode, seconds"
 
 
 @session

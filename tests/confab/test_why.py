@@ -87,6 +87,15 @@ def test_an_inapplicable_alternative_is_explained_by_its_failing_condition(
     assert serving.why_not(asked).lacks == (lacks,)
 
 
+def test_an_alternative_without_the_individual_of_a_negated_condition_takes_any_individual(tmp_path: Path) -> None:
+    """The behaviour requires that no item is at the place; the place isn't named."""
+    confab.new_domain("garage", tmp_path / "garage")
+    result = confab.load(tmp_path / "garage" / "garage-scene.ttl").plan()
+    told = result.why_not("B1_CARRY plate2")
+    assert told.plan is not None
+    assert "is possible and costs 2 more" in str(told)
+
+
 def test_an_alternative_may_name_an_individual_that_the_task_does_not_need() -> None:
     result = confab.load("living-room").plan()
     assert "bread1" not in result.problem.individuals
