@@ -546,7 +546,7 @@ def test_several_hands_reach_the_goals_after_any_intervention(
     assert episode.status is End.REACHED
     assert holds(episode)
     assert not episode.missed
-    assert [event.end for event in episode.events] == sorted(event.end for event in episode.events)
+    assert [event.begin for event in episode.events] == sorted(event.begin for event in episode.events)
 
 
 def test_several_hands_begin_nothing_more_once_an_intervention_is_due() -> None:
