@@ -212,7 +212,6 @@ class ExecuteKeywords(TypedDict, total=False):
     perturb: bool
     noise: float
     both_hands: bool
-    schedule: TimedPlan | None
 
 
 def carry_out(
@@ -255,8 +254,8 @@ def carry_out(
     texts = several(interventions)
     check_seconds("time_limit", time_limit)
     with within(time_limit), spectator(watch, observer) as heard:
-        options["schedule"] = getattr(plan, "timed", None)
-        return execute(scene, problem, begun, texts, world, planner, seed, heard, **options)
+        schedule = getattr(plan, "timed", None)
+        return execute(scene, problem, begun, texts, world, planner, seed, heard, schedule=schedule, **options)
 
 
 def _whole_problem(scene: Known, plan: AnyPlan | None, goals: Sequence[str]) -> Problem:

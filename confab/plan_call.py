@@ -35,10 +35,10 @@ from confab.reasoner.reading.problem import Reading
 from confab.reasoner.reading.relevance import recognise
 from confab.reasoner.refining import never_done, without
 from confab.reasoner.symbols import Behavior, GroundBehavior, Problem
+from confab.reasoner.timing import may_overlap_by_need
 from confab.timing import (
     asks_for_times,
     concurrent,
-    may_overlap_by_need,
     needs_others_meanwhile,
     scheduled,
     with_unit_costs,

@@ -26,7 +26,7 @@ from confab.reasoner.names import right_arguments, right_names
 from confab.reasoner.symbols import FALSE, Fact
 from confab.reasoner.vocabulary import CORE, INDIVIDUAL, OWL
 from confab.table import Table
-from confab.timing import asks_for_times
+from confab.timing import has_times
 
 if TYPE_CHECKING:
     from typing import Unpack
@@ -151,7 +151,7 @@ class Scene(Known):
         """
         from confab.execution import carry_out
 
-        if plan is None and (self.problem.weights or asks_for_times(self.problem, None)):
+        if plan is None and (self.problem.weights or has_times(self.problem)):
             # the plan determines the soft goals to reach, and the schedule
             chosen = self.plan(several(goals), memory, mode, time_limit)
             plan = chosen if chosen.solved else None

@@ -11,7 +11,7 @@ from confab.formats import ScheduledStepJson, ScheduleJson
 from confab.planner.plan import Limits, Outcome, Status
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import Deadline
-from confab.reasoner.symbols import Problem, Span
+from confab.reasoner.symbols import Problem
 from confab.reasoner.timing import only_during
 
 if TYPE_CHECKING:
@@ -84,19 +84,6 @@ def scheduled(
 def needs_others_meanwhile(problem: Problem) -> bool:
     """Return whether behaviours need a value that another behaviour gives only during its execution."""
     return bool(only_during(problem))
-
-
-def may_overlap_by_need(problem: Problem) -> bool:
-    """Return whether a condition or effect concerns the start or end of a step.
-
-    If conditions or effects concern only the start or end of a step, overlapping steps may reach more goals.
-    """
-    return any(
-        span is not Span.THROUGHOUT
-        for behavior in problem.domain.behaviors.values()
-        if behavior.timing is not None
-        for span, _ in (*behavior.timing.conditions, *behavior.timing.effects)
-    )
 
 
 # --------------------------------------------------------------------------------------------------------------- forms

@@ -78,6 +78,19 @@ def only_during(problem: Problem) -> frozenset[str]:
     return frozenset(found)
 
 
+def may_overlap_by_need(problem: Problem) -> bool:
+    """Return whether a condition or effect concerns the start or end of a step.
+
+    If conditions or effects concern only the start or end of a step, overlapping steps may reach more goals.
+    """
+    return any(
+        span is not Span.THROUGHOUT
+        for behavior in problem.domain.behaviors.values()
+        if behavior.timing is not None
+        for span, _ in (*behavior.timing.conditions, *behavior.timing.effects)
+    )
+
+
 def _passing(behavior: Behavior) -> tuple[ValueEffect, ...]:
     """Return the effects at the start of a behaviour that a later effect of the behaviour reverses."""
     if behavior.timing is None:

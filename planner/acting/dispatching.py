@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
+from confab.planner.acting.schedule import WorkerSlot
 from confab.planner.plan import Plan, Reason, Step
 from confab.planner.timed.activities import in_sequence
 from confab.planner.timed.call import Timed, in_time
@@ -107,6 +108,16 @@ def _scheduled(problem: Problem, plan: Plan) -> tuple[Timed, tuple[Symbol, ...]]
             return found, given_up
         first = first if first.reason else found
     return first, ()
+
+
+def in_order(slots: Sequence[WorkerSlot]) -> list[tuple[int, bool]]:
+    """Return the begins and ends of primitives in the order of their times: the number of the slot, and whether it's an end.
+
+    At the same instant, ends come before begins.
+    """
+    begins = [(slot.begin, 1, number, False) for number, slot in enumerate(slots)]
+    ends = [(slot.end, int(slot.begin == slot.end), number, True) for number, slot in enumerate(slots)]
+    return [(number, is_end) for *_, number, is_end in sorted(begins + ends)]
 
 
 def _paths(scheduled: Sequence[Step], primitives: Sequence[Step]) -> tuple[tuple[int, ...], ...]:

@@ -100,6 +100,11 @@ def changes(before: State, after: State, seconds: float) -> list[BeliefChange]:
     return [BeliefChange(seconds, symbol, after.get(symbol)) for symbol in changed]
 
 
+def changed(values: State, seconds: float) -> list[BeliefChange]:
+    """Return the changes of symbols to new values at a time."""
+    return [BeliefChange(seconds, symbol, value) for symbol, value in values.items()]
+
+
 def situation(initial: State, course: Iterable[BeliefChange], seconds: float = math.inf) -> dict[Symbol, str]:
     """Return the situation at a time: the initial situation with the changes that were observed until this time."""
     state = dict(initial)

@@ -22,7 +22,7 @@ from time import perf_counter
 
 from confab.planner.acting.agenda import Postponed, RemainingSteps, chains_of, tree_of, without
 from confab.planner.acting.belief import UNSEEN, Belief
-from confab.planner.acting.dispatching import Concurrency, Remaining, remaining
+from confab.planner.acting.dispatching import Concurrency, Remaining, in_order, remaining
 from confab.planner.acting.episode import (
     End,
     Episode,
@@ -33,6 +33,7 @@ from confab.planner.acting.episode import (
     InterventionKind,
     Replan,
     Surprise,
+    changed,
 )
 from confab.planner.acting.failure_memory import Caution, refuted_by, relied_on_by
 from confab.planner.acting.record import Record
@@ -42,6 +43,7 @@ from confab.planner.acting.unreached import blamed, blocked, with_discoveries
 from confab.planner.acting.world import INTERRUPTED, WITHOUT_EFFECT, Guarded, Verdict, World, WorldError, WorldReport
 from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, renumbered
+from confab.planner.timed.activities import InapplicableError, StepSimulation
 from confab.planner.validation import followed, open_goals
 from confab.reasoner.limits import LimitError, check
 from confab.reasoner.refutations import Refutation
@@ -133,9 +135,7 @@ class _RunningEpisode:
     going: bool = True
     goals: Postponed = field(default_factory=Postponed)
     requested: str = ""  # the reason for checking the agenda, if a check is requested
-    late: dict[Symbol, Fraction] = field(
-        default_factory=dict
-    )  # goals that can't be in time, and since when this is known
+    late: dict[Symbol, Fraction] = field(default_factory=dict)  # goals that can't be in time, and when this was known
     missed: dict[Symbol, str | None] = field(default_factory=dict)  # values that were expected and not observed
 
     def __post_init__(self) -> None:
@@ -173,21 +173,31 @@ class _RunningEpisode:
             return
         if self.goals.put_off:
             record.status = End.GAVE_UP
-        for reason in (*self.goals.reasons(), *self.missed_deadlines()):
+        for reason in (*self.goals.reasons(), *self.missed_times()):
             record.reason(reason)
         self.going = False
         if record.reasons and record.status is End.REACHED:
             record.status = End.IMPOSSIBLE
         self.say("over", text=record.status.value)
 
-    def missed_deadlines(self) -> Iterator[Reason]:
-        """Yield a reason for each goal that was reached after its deadline."""
-        for goal, by in (self.belief.problem.times or Times()).deadlines.items():
+    def missed_times(self) -> Iterator[Reason]:
+        """Yield a reason for each goal that was reached after its deadline, and for each step outside of a window or fixed time."""
+        times = self.belief.problem.times or Times()
+        for goal, by in times.deadlines.items():
             reached = max((change.seconds for change in self.record.course if change.symbol == goal), default=0.0)
             if goal in self.belief.goal and reached > by:
                 known = f"; this was known at {float(self.late[goal]):g} s" if goal in self.late else ""
                 fact = Fact(goal, self.belief.goal[goal])
                 yield Reason(f"{fact} is a goal by {float(by):g} s, and holds from {reached:g} s on{known}")
+        for event in self.record.events:
+            took = f"{event.step} took from {event.begin:g} to {event.end:g} s"
+            for one in event.step.arguments:
+                windows = times.windows.get(one, ((Fraction(0), None),))
+                if not any(low <= event.begin and (high is None or event.end <= high) for low, high in windows):
+                    yield Reason(f"{took}, and {one} isn't available then")
+            at = times.events.get(event.step.behavior)
+            if at is not None and event.begin != at:
+                yield Reason(f"{took}, and happens at {float(at):g} s")
 
     def break_off(self, why: str) -> None:
         """End the episode at once, because the world doesn't respond."""
@@ -222,7 +232,7 @@ class _RunningEpisode:
         """Return the situation expected after the next primitive, or None if the primitive's precondition doesn't hold."""
         step, problem = next(chains_of(self.agenda.steps))[-1], self.belief.task
         after = followed(problem, [step], problem.initial)
-        return None if after is None else {symbol: value for symbol, value in after.items() if value != UNSEEN}
+        return None if after is None else _perceived(after)
 
     def perform(self, expected: dict[Symbol, str]) -> tuple[tuple[Step, ...], State, Verdict]:
         """Execute the next primitive and observe; a failed primitive counts as done if its effects are observed.
@@ -231,7 +241,8 @@ class _RunningEpisode:
         """
         chain, record = next(chains_of(self.agenda.steps)), self.record
         step, before = chain[-1], self.belief.problem.initial
-        changes = self.begin(chain, before, expected)
+        changes = [Fact(s, v) for s, v in sorted(expected.items()) if before.get(s) != v]
+        self.begin(chain, before)
         self.say("begin", step, changes)
         begin = self.world.seconds
         verdict = self.world.execute(step)
@@ -256,11 +267,10 @@ class _RunningEpisode:
             self.give_up(Reason(f"stopped at the limit of {self.retries.most} primitives"))
         return chain, before, verdict
 
-    def begin(self, chain: tuple[Step, ...], before: State, after: State) -> list[Fact]:
-        """Record that the ancestors of a primitive have begun; return the facts that the primitive changes."""
+    def begin(self, chain: tuple[Step, ...], before: State) -> None:
+        """Record that the ancestors of a primitive have begun."""
         for above in chain[:-1]:
             self.agenda.begun.setdefault(above.path, before)
-        return [Fact(s, v) for s, v in sorted(after.items()) if before.get(s) != v]
 
     def remaining(self) -> Remaining | None:
         """Return the dispatch of the remaining primitives; without a schedule, one primitive at a time is executed from now on."""
@@ -268,7 +278,9 @@ class _RunningEpisode:
         now = Fraction(self.world.seconds)
         found = remaining(self.belief.task, Plan(self.agenda.steps).primitives, now, self.together)
         if isinstance(found, Reason):
-            self.together = None
+            self.together, times = None, self.belief.problem.times or Times()
+            if times.windows or times.events:  # one primitive after another would ignore them
+                self.give_up(found)
             return None
         for goal in found.given_up:
             self.tell_late(goal, now)
@@ -285,41 +297,52 @@ class _RunningEpisode:
 
         The world is observed afterwards. After a failure, the episode continues with one primitive at a time.
         """
-        record, state, finished = self.record, self.belief.problem.initial, set[tuple[int, ...]]()
-        chains = {chain[-1].path: chain for chain in chains_of(self.agenda.steps)}
-        start, paths = Fraction(self.world.seconds), left.paths
+        record, start, dispatch, paths = self.record, Fraction(self.world.seconds), left.dispatch, left.paths
 
         def may_begin(done: Set[int]) -> bool:
             now = Fraction(self.world.seconds) - start
-            for late in left.dispatch.late(now):
+            for late in dispatch.late(now) if dispatch.begun else ():  # other worlds have an order of their own
                 if late.certain:
                     self.tell_late(late.goal, start + now)
             return not self.due({paths[number] for number in done})
 
-        ended = self.world.execute_together(left.dispatch, may_begin)
+        ended = self.world.execute_together(dispatch, may_begin)
         self.note_what_happened_by_the_clock()
-        seen, problem = self.world.observe(), self.belief.problem
-        failed = list[tuple[tuple[Step, ...], State, Verdict]]()
-        for slot, verdict in ended:
-            chain = chains[paths[slot.position]]
-            step = chain[-1]
-            after = followed(problem, [step], state) or state
-            changes = self.begin(chain, state, after)
-            relied_on = tuple(relied_on_by(problem, chain))
-            record.events.append(ExecutedPrimitive(step, slot.begin, slot.end, verdict.ok, verdict.code, (), relied_on))
-            if is_done(verdict, changes, seen):
-                record.done.update((above.path, above) for above in chain)
-                finished.add(step.path)
-                record.changes(state, after, slot.end)
-                state = after
-            if not verdict.ok:
-                failed.append((chain, state, verdict))
-            self.say("end", step, changes)
+        seen, every = self.world.observe(), {chain[-1].path: chain for chain in chains_of(self.agenda.steps)}
+        chains = [every[paths[slot.position]] for slot, _ in ended]
+        course = StepSimulation(self.belief.task, [chain[-1] for chain in chains])
+        finished, failed = set[tuple[int, ...]](), list[tuple[tuple[Step, ...], State, Verdict]]()
+        for number, is_end in in_order([slot for slot, _ in ended]):
+            chain, step, (slot, verdict) = chains[number], chains[number][-1], ended[number]
+            with suppress(InapplicableError):  # the observation shows what has happened instead
+                if not is_end:
+                    before: State = _perceived(course.facts.state())
+                    self.begin(chain, before)
+                    relied_on = tuple(relied_on_by(self.belief.problem, chain))
+                    record.events.append(
+                        ExecutedPrimitive(step, slot.begin, slot.end, verdict.ok, verdict.code, (), relied_on)
+                    )
+                    failed += [] if verdict.ok else [(chain, before, verdict)]
+                    course.begin(number)
+                    record.course += changed(course.changes(number, "begin"), slot.begin)
+                    continue
+                changes = [Fact(*one) for one in course.changes(number, "begin", "middle").items()]
+                self.say("end", step, changes)
+                if is_done(verdict, changes, seen):
+                    record.done.update((above.path, above) for above in chain)
+                    finished.add(step.path)
+                    course.end(number)
+                    record.course += changed(course.changes(number, "middle", "end"), slot.end)
         record.course.sort(key=lambda change: change.seconds)
         self.agenda.steps = without(self.agenda.steps, finished)
-        self.belief.problem = replace(problem, initial=state)
+        state = _perceived(course.facts.state())
+        self.belief.problem = replace(self.belief.problem, initial=state)
         surprises = self.look(dict(state), seen)
-        if surprises or self.agenda.steps:
+        if not ended and not self.due():
+            self.give_up(
+                Reason("no remaining step can begin: a window is over, or the order of two ends isn't certain")
+            )
+        elif surprises or self.agenda.steps:
             self.request_replan("" if surprises else "the actors were interrupted", surprises)
         if len(record.events) >= self.retries.most:
             self.give_up(Reason(f"stopped at the limit of {self.retries.most} primitives"))
@@ -589,6 +612,11 @@ def is_done(verdict: Verdict, changes: Sequence[Fact], seen: State) -> bool:
     """Return whether a primitive has succeeded: it was reported as done, or all its effects are observed."""
     there = bool(changes) and all(seen.get(fact.symbol) == fact.value for fact in changes)
     return verdict.ok or (there and verdict.code != INTERRUPTED)
+
+
+def _perceived(state: State) -> dict[Symbol, str]:
+    """Return a state without symbols of which no value is perceived."""
+    return {symbol: value for symbol, value in state.items() if value != UNSEEN}
 
 
 def _told(surprise: Surprise) -> str:

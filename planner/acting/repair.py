@@ -31,6 +31,7 @@ from confab.planner.validation import validate
 from confab.reasoner.amounts import meets
 from confab.reasoner.limits import LimitError, check, within
 from confab.reasoner.symbols import FALSE, Problem, State, Symbol
+from confab.reasoner.timing import may_overlap_by_need
 
 CLOSE = 1.1
 """Maximum ratio of a repair's cost to a new plan's cost; if the repair costs more, the new plan is taken."""
@@ -178,6 +179,9 @@ def replan(
         first, problem = call.tree().steps, replace(problem, initial=call.table.state())
     left = limits.until(end)
     outcome = planner(problem, limits=left) if planner else hierarchical_plan(problem, limits=left, using=using)
+    if outcome.status is Status.UNSOLVABLE and may_overlap_by_need(now):
+        text = "no sequence of whole steps reaches the goal; steps that overlap by need are planned only before the first step"
+        return None, replace(outcome, status=Status.GAVE_UP, certificate=None, reason=Reason(text))
     if outcome.plan is None:
         with within(left.seconds):
             return None, certified(now, outcome)

@@ -150,8 +150,11 @@ class SymbolicWorld:
 
     def _lasting(self, step: Step) -> Fraction:
         """Return the duration of a primitive that begins now; an inapplicable primitive takes a second."""
+        behavior, timed = self.problem.domain.behaviors.get(step.behavior), self.problem.times is not None
+        if behavior is None or not (timed or behavior.timing):
+            return self._stretch(Fraction(self._seconds_of.get(step.behavior, SECOND)))
         course = StepSimulation(replace(self.problem, initial=self.state), [step])
-        with suppress(InapplicableError, KeyError):
+        with suppress(InapplicableError):
             course.begin(0)
         return self._stretch(Fraction(self._seconds_of.get(step.behavior, course.seconds.get(0, SECOND))))
 

@@ -17,7 +17,7 @@ from confab.planner.plan import Step
 from confab.planner.timed.pieces import Pieces, actors_of, default_actors, duration_of, pieces_of, terms_at
 from confab.planner.validation import BehaviorReader, Cell, LoggedState
 from confab.reasoner.limits import check
-from confab.reasoner.symbols import Behavior, Problem, State, Times
+from confab.reasoner.symbols import Behavior, Problem, State, Symbol, Times
 
 ReadAccess: TypeAlias = "tuple[str, object]"
 """A read access: the value of a symbol (situation type and arguments), or all symbols of a situation type with a given value."""
@@ -176,9 +176,16 @@ class StepSimulation:
 
     def end(self, number: int) -> None:
         """End a step: make the stored effects, test the conditions of its end, and make the effects of its end."""
+        if not self.made[number]:
+            raise InapplicableError(f"{self.steps[number]}: it hasn't begun")
         for cell, (_, after) in self.made[number]["middle"].changes.items():
             self.facts.put(*cell, after)
         self.made[number]["end"] = self.done(self.steps[number], self.piece(number).end, self.terms[number], True)
+
+    def changes(self, number: int, *parts: str) -> dict[Symbol, str]:
+        """Return the symbols that parts of a step (``begin``, ``middle``, ``end``) change, each with its new value."""
+        made = [self.made[number].get(part, Access()) for part in parts]
+        return {Symbol(*cell): new for one in made for cell, (old, new) in one.changes.items() if old != new}
 
     def change(self, state: State) -> set[int]:
         """Continue in another state; return the begun steps that read or change a symbol whose value differs in this state."""

@@ -32,8 +32,8 @@ class Network:
     separation : int
         The minimum time between conflicting events.
     tick : int
-        The minimum time between an event and an end that the event must precede. At the same instant, ends come before begins,
-        and ends have the order of the activities.
+        The minimum time between an event and an end that the event must precede. At the same instant, ends come before begins
+        and before activities without duration, and ends have the order of the activities.
     durations : list of int
         The duration of each activity with the actors of the plan; other actors may have other durations.
     edges : tuple of Edge
@@ -56,7 +56,8 @@ class Network:
 
     def least(self, i: int, high: int, j: int, low: int) -> int:
         """Return the minimum time from the begin or end of activity `i` to the begin or end of activity `j`."""
-        return self.tick if low == END and (high == BEGIN or i > j) else self.separation
+        after_ends = high == BEGIN or self.durations[i] == 0 or i > j
+        return self.tick if low == END and after_ends else self.separation
 
     def ends(self, i: int, begin: int, lasts: int) -> list[int]:
         """Return the latest ends that the latest times, the time window and the fixed time of an activity allow.

@@ -310,6 +310,14 @@ def test_a_task_with_durations_is_executed_in_time_and_keeps_its_constraints(
     assert varied[0] != varied[1] == varied[2]
 
 
+def test_the_bakery_of_the_guide_is_executed_within_its_window_and_its_deadline() -> None:
+    run = confab.load(Path(__file__).parents[2] / "docs" / "examples" / "bakery" / "bakery.ttl").execute()
+    assert run.reached
+    assert run.episode.seconds["simulated"] <= 5_700
+    begins = [event.begin for event in run.episode.events if event.step.behavior == "DELIVER"]
+    assert min(begins) >= 1_800
+
+
 def test_a_missed_deadline_is_the_reason_for_impossible(tmp_path: Path) -> None:
     goal = ":g1 a owl:NamedIndividual, c:ValueCondition ;"
     (tmp_path / "late.ttl").write_text(OVENS.replace(goal, f'{goal} c:by "PT30S"^^xsd:dayTimeDuration ;'), "utf-8")

@@ -24,7 +24,8 @@ from confab.reasoner.generate import write_scene
 from confab.reasoner.graph.knowledge import load
 from confab.reasoner.memory.links import Links
 from confab.reasoner.reading.problem import read
-from confab.reasoner.symbols import FALSE, Fact, Problem, State, Symbol
+from confab.reasoner.symbols import FALSE, Fact, State, Symbol
+from tests.planner.serving import planned, serving
 
 SERVED_AS_IN_FIGURE_8 = {
     22: {2: [6, 28, 32], 22: [18, 30, 32]},
@@ -32,18 +33,6 @@ SERVED_AS_IN_FIGURE_8 = {
     28: {3: [7, 28, 32], 20: [16, 30, 32]},
     39: {5: [9, 29, 33], 15: [11, 35, 37, 33], 26: [22, 31, 33]},
 }
-
-
-@cache
-def serving() -> Problem:
-    return read(load("beverage-serving")).problem
-
-
-@cache
-def planned() -> Plan:
-    found = plan(serving()).plan
-    assert found is not None
-    return found
 
 
 @cache

@@ -3,37 +3,30 @@
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
-from functools import cache, partial
+from functools import partial
+from pathlib import Path
 from random import Random
 
 import pytest
 
+import confab
 from confab.planner.acting.dispatching import Concurrency, later
 from confab.planner.acting.episode import End, Episode, Event, Intervention, InterventionKind
 from confab.planner.acting.executive import act
 from confab.planner.acting.symbolic_world import SymbolicWorld
-from confab.planner.hierarchical.planner import plan
-from confab.planner.plan import Plan
 from confab.planner.timed.plan import Slot, TimedPlan
 from confab.planner.timed.validation import validate_timed
-from confab.reasoner.graph.knowledge import load
-from confab.reasoner.reading.problem import read
+from confab.reasoner.pddl.importing import imported
+from confab.reasoner.pddl.syntax import parse
+from confab.reasoner.pddl.turtle import turtle
 from confab.reasoner.symbols import Fact, Problem, Symbol, Times
+from tests.planner.serving import planned, serving
+from tests.planner.test_dispatch import burning, fuse
+from tests.reasoner.test_durative import CELLAR, FUSES, TRUCK, WAY
+from worlds.timed import problem_of
 
 FILLED, MOVED = Symbol("BEVERAGE", ("cup1",)), Symbol("LOCATION", ("cup2",))
 SERIAL = 32
-
-
-@cache
-def serving() -> Problem:
-    return read(load("beverage-serving")).problem
-
-
-@cache
-def planned() -> Plan:
-    found = plan(serving()).plan
-    assert found is not None
-    return found
 
 
 def with_times(**times: object) -> Problem:
@@ -148,3 +141,38 @@ def test_an_intervention_stops_the_primitives_that_depend_on_a_changed_fact_and_
     assert all(event.end == pytest.approx(at) and "left_hand" in event.step.arguments for event in interrupted)
     assert all(event.ok for event in running if event not in interrupted)
     assert episode.status is End.REACHED
+
+
+@pytest.mark.parametrize("by", [5, 6])
+def test_a_goal_is_reached_when_its_step_ends_although_a_step_that_it_needs_meanwhile_ends_later(by: int) -> None:
+    """The match burns for 8 s, and the fuse is mended after 5 s."""
+    problem = problem_of(burning(8, 5))
+    problem = replace(problem, times=Times(deadlines=dict.fromkeys(problem.goal, Fraction(by))))
+    timed = fuse(8, 5)
+    assert timed is not None
+    episode = act(problem, SymbolicWorld(problem), timed.plan, together=Concurrency(timed))
+    assert episode.status is End.REACHED
+    assert [(change.seconds, change.value) for change in episode.course] == [(0, "true"), (5, "true"), (8, "false")]
+
+
+def test_steps_that_overlap_by_need_and_are_planned_anew_are_given_up_and_not_called_impossible() -> None:
+    problem = problem_of(burning(8, 5))
+    assert act(problem, SymbolicWorld(problem)).status is End.GAVE_UP
+
+
+def test_a_task_with_windows_that_is_executed_one_step_after_another_is_not_called_reached() -> None:
+    problem = with_times(windows={"right_hand": ((Fraction(40), None),)})
+    episode = act(problem, SymbolicWorld(problem), planned())
+    assert episode.status is End.IMPOSSIBLE
+    assert "took from 12 to 13 s, and right_hand isn't available then" in episode.reasons[0].text
+
+
+@pytest.mark.parametrize(("texts", "seconds"), [((CELLAR, FUSES), 6), ((TRUCK, WAY), 10)])
+def test_imported_durative_actions_and_timed_literals_are_executed_in_time(
+    texts: tuple[str, str], seconds: int, tmp_path: Path
+) -> None:
+    file = tmp_path / "scene.ttl"
+    file.write_text(turtle(imported(parse(*texts)).problem, "title", "description"), encoding="utf-8")
+    run = confab.load(file).execute()
+    assert run.reached
+    assert run.episode.seconds["simulated"] == pytest.approx(seconds, abs=0.01)

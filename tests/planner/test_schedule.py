@@ -8,25 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from confab.planner.acting.schedule import PartialOrder, partial_order, ready, urgency_of, worker_of
-from confab.planner.hierarchical.planner import plan
 from confab.planner.plan import Plan, Step
 from confab.planner.validation import validate
-from confab.reasoner.graph.knowledge import load
-from confab.reasoner.reading.problem import read
-from confab.reasoner.symbols import Problem
+from tests.planner.serving import planned, serving
 from tests.planner.slots import schedule
-
-
-@cache
-def serving() -> Problem:
-    return read(load("beverage-serving")).problem
-
-
-@cache
-def planned() -> Plan:
-    found = plan(serving()).plan
-    assert found is not None
-    return found
 
 
 @cache
