@@ -274,6 +274,8 @@ def chosen(name: str, names: Iterable[str]) -> str:
             return plain[there[0]]
         if there:
             rows[there[0]] += f" {rights} {others}"
+    if asked in dict(pairs(NEEDLESS)):
+        return ""
     meant = by_words([*pairs(rows), *((each, each) for each in plain)], words_of(asked))
     return plain.get(meant, "")
 

@@ -12,13 +12,13 @@ from collections.abc import Mapping
 OVERVIEW: Mapping[str, str] = {
     "confab": "to begin: confab.load(SCENE), confab.scenes(), confab.new_domain(NAME), confab.generate(FAMILY), "
     "confab.validate(FILE); with scene = confab.load(SCENE), to read: scene.facts, scene.objects, scene.goals, scene.behaviors, "
-    "scene.query(TEXT); to change: scene.with_fact(FACT), scene.with_goal(FACT); to plan: scene.plan(), scene.explain(); to "
-    "try: scene.verify(), scene.execute(); to show: scene.picture(FILE), scene.plan().report(FILE), scene.serve(); to learn: "
+    "scene.query(TEXT); to change: scene.with_fact(FACT), scene.with_goal(FACT), scene.without_goal(GOAL); to plan: scene.plan(), "
+    "scene.explain(); to try: scene.verify(), scene.execute(); to show: scene.picture(FILE), scene.plan().report(FILE), scene.serve(); to learn: "
     "confab.Memory.of(SCENE), confab.Memory.load(FILE), confab.practise(SCENES); to limit time: confab.within(SECONDS); also: "
     "Memory, Scene, Result, Report, Execution, Table, Curve, KnowledgeError, __version__",
     "scene": "to read: facts, objects, goals, behaviors, problem.classes, problem.domain.situations, embodiment, title; to ask: "
-    "query(TEXT), affordances(OBJECT), explain(); to change (a copy): with_fact(FACT), with_goal(FACT); to plan: plan(); to "
-    "try: verify(), execute(); to show: picture(FILE), board(), serve(), plan().report(FILE); to save: save(FILE), "
+    "query(TEXT), affordances(OBJECT), explain(); to change (a copy): with_fact(FACT), with_goal(FACT), without_goal(GOAL); to plan: "
+    "plan(); to try: verify(), execute(); to show: picture(FILE), board(), serve(), plan().report(FILE); to save: save(FILE), "
     "export(FOLDER), to_pddl(); to read files: read_plan(FILE), read_result(FILE), read_episode(FILE), read_report(FILE, PLAN); "
     "to use libraries: graph, owl, to_unified_planning(); also: iri, with_episodes(FILE), problem, knowledge, names, seconds, "
     "reading, read_whole, settle, construct, applicable_query, quantifying_query, update_of",
@@ -105,8 +105,9 @@ WORDS: Mapping[str, str] = {
     "move without patch teleport retract believe suppose imagine pretend shift relocate displace swap transform assert_fact "
     "set_initial_value with_facts set_property observe_fact set_initial_state fluent_value with_init apply_fact set_location "
     "place_object set_position del_fact delete_fact clear_fact set_state set_value",
-    "with_goal": "set_goal add_goal Goal want with_goals replace_goal remove_goal change_goal set_objective clear_goals "
-    "delete_goal del_goal update_goal new_goal reset_goals set_target new_task achieve_goal",
+    "with_goal": "set_goal add_goal Goal want with_goals replace_goal change_goal set_objective update_goal new_goal set_target "
+    "new_task achieve_goal",
+    "without_goal": "without_goals remove_goal clear_goals delete_goal del_goal reset_goals no_goals drop_goal only_goal omit_goal",
     "plan": "solve search astar bfs policy heuristic replan Replanner Step Result query planner reach achieve optimise optimize "
     "solution solver plans repair redo resolve seek decompose think pyhop htn compute find_plan OneshotPlanner make_plan "
     "run_planner SequentialPlanner AnytimePlanner plan_scene solve_problem PlanResult TaskNetwork PlannerMode "
@@ -533,6 +534,8 @@ OPTIONS = {
     "report": "html page visualize visualise web show_html view render plot html_report show open pretty browser",
     "video": "film movie record record_video mp4 save_video video_file animation gif capture",
     "gui watch": "render viewer window show display visualise visualize human headless gui_on interactive use_gui render_mode",
+    "without_goal": "no_goals no_goal remove_goal drop_goal clear_goals only_goal only replace_goals",
+    "fact": "facts with_fact set state init initial initial_state assume given",
     "goals goal": "target task objective goal_state set_goal targets new_goal want desired goal_facts tasks to_achieve",
     "memory": "experience knowledge model learned mem use_memory memory_file with_memory checkpoint weights learned_from use",
     "no_memory": "without_memory no_learning fresh memoryless",
@@ -591,6 +594,9 @@ NEEDLESS = {
     "number_of_plans top_k alternatives diverse all_plans max_plans",
     "state the values of a variable in the query: VALUES ?x { :cup1 }": "bindings binding initbindings init_bindings "
     "substitutions values params parameters variables vars",
+    "scene.with_fact(FACT) returns a scene with another fact": "fact facts",
+    "scene.without_goal() returns a scene without goals, to plan for other goals only": "only replace_goals only_goals no_goals "
+    "without_goal clear_goals",
     "the same call gives the same result in every process": "seed random_seed random_state rng set_seed",
     "the option -v of a command prints the duration of each stage": "verbose verbosity debug log_level loglevel log "
     "show_progress progress_bar",

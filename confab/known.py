@@ -215,7 +215,7 @@ class Known(metaclass=RightNames):
         """
         from confab.reasoner.reading.restating import with_facts
 
-        return self._restated(with_facts, facts)
+        return self._restated("--fact", with_facts, facts)
 
     def with_goal(self: S, *goals: Facts) -> S:
         """Return a copy of the scene with some goals replaced. A goal is given as one text, or as a tuple of its words.
@@ -233,15 +233,55 @@ class Known(metaclass=RightNames):
         """
         from confab.reasoner.reading.restating import with_goals
 
-        return self._restated(with_goals, goals)
+        return self._restated("--goal", with_goals, goals)
+
+    def without_goal(self: S, *goals: Facts) -> S:
+        """Return a copy of the scene without some of its goals; without an argument, or with ``all``, without any goal.
+
+        A goal is given by its first words: ``cup1`` stands for all goals of cup1, ``cup1 LOCATION`` for one goal.
+
+        Raises
+        ------
+        KnowledgeError
+            The scene has no such goal, or is at a SPARQL endpoint.
+
+        Examples
+        --------
+        >>> import confab
+        >>> scene = confab.load("beverage-serving")
+        >>> scene.without_goal("cup1").goals[2:]
+        ['cup2 BEVERAGE beverage2', 'cup2 LOCATION location5']
+        >>> scene.without_goal().plan("cup2 LOCATION location8").plan.length
+        {1: 2, 2: 4, 3: 12}
+        """
+        from confab.reasoner.reading.restating import without_goals
+
+        goal_facts = {str(fact): fact for fact in (Fact(*one) for one in self.problem.goal.items())}
+        found = dict[str, Fact]()
+        for given in [each for one in goals for each in several([one] if isinstance(one, tuple) else one)] or ["all"]:
+            meant = [goal for goal in goal_facts if given == "all" or f"{goal} ".startswith(f"{given} ")]
+            if not meant and given != "all":
+                known = f"the goals are: {'; '.join(goal_facts)}" if goal_facts else "it has no goals"
+                raise KnowledgeError(f"the scene has no goal '{given}'{nearest(given, goal_facts, known)}")
+            found |= {goal: goal_facts[goal] for goal in meant}
+        return self._copied("--without-goal", without_goals, [*found.values()])
 
     def _restated(
-        self: S, change: Callable[[KnowledgeGraph, Reading, list[Fact]], KnowledgeGraph], facts: Sequence[Facts]
+        self: S,
+        option: str,
+        change: Callable[[KnowledgeGraph, Reading, list[Fact]], KnowledgeGraph],
+        facts: Sequence[Facts],
     ) -> S:
         self.settle()
         single = all(isinstance(fact, str) for fact in facts)
         texts = several(cast("Facts", facts)) if single else [text for fact in facts for text in several(fact)]
-        copy = change(self.knowledge, self.reading, [Fact(*parse_fact(self.problem, text)) for text in texts])
+        return self._copied(option, change, [Fact(*parse_fact(self.problem, text)) for text in texts])
+
+    def _copied(
+        self: S, option: str, change: Callable[[KnowledgeGraph, Reading, list[Fact]], KnowledgeGraph], facts: list[Fact]
+    ) -> S:
+        copy = change(self.knowledge, self.reading, facts)
+        copy.changes = (*copy.changes, *(f"{option}={fact}" for fact in facts))
         infer(copy)
         return type(self)(copy, dict(self.seconds))
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from shlex import join
 from typing import TYPE_CHECKING
 
+from confab.commands.given import with_changes
 from confab.history import RECORD, record
 from confab.memory import Memory, undisturbed
 from confab.planner.plan import Status
@@ -54,14 +55,15 @@ class Job:
     film: bool = True
     gui: bool = False
 
-    @property
-    def command(self) -> str:
-        """The command line that repeats the run, without options for output."""
+    def command(self, changes: tuple[str, ...] = ()) -> str:
+        """Return the command line that repeats the run in the changed scene, without options for output."""
         given = {"--mode": self.mode, "--seed": str(self.seed), "--noise": f"{self.noise:g}"}
         first = {"--mode": DEFAULT_MODE, "--seed": "0", "--noise": "0"}
         options = [part for name, value in given.items() if value != first[name] for part in (name, value)]
         memory = [] if self.memory is None else ["--memory", str(self.memory)]
-        return join(["confab", "run", self.scene, *(f"--goal={goal}" for goal in self.goals), *options, *memory])
+        return join(
+            ["confab", "run", self.scene, *changes, *(f"--goal={goal}" for goal in self.goals), *options, *memory]
+        )
 
 
 def run(job: Job) -> int:
@@ -94,7 +96,7 @@ def run(job: Job) -> int:
     if any(finding.serious for finding in findings):
         return NO
     announce("loading the scene")
-    scene = load(job.scene)
+    scene = with_changes(load(job.scene))
     bodies = has_robot(scene)
     physics = find_spec("pybullet") is not None
     if bodies and not physics:
@@ -180,7 +182,7 @@ def written(scene: Scene, result: Result, report: Report | None, learned: Memory
     out, paths = made_folder(job.out), {}
     if result.outcome.plan is not None:
         paths["plan"] = result.save(out / "plan.json")
-    data = page_data(scene, result, report, learned=learned, again=job.command)
+    data = page_data(scene, result, report, learned=learned, again=job.command(scene.knowledge.changes))
     paths["report"] = write_page(out / "report.html", data)
     how = {"goals": list(job.goals), "mode": job.mode, "seed": job.seed, "noise": job.noise}
     paths["record"] = record(out, data, how, "" if learned is None else learned.said())

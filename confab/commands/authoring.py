@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 from click.exceptions import Exit
 
-from confab.commands.given import PDDL
+from confab.commands.given import PDDL, load_scene, plan_in
 from confab.commands.given import SCENE as A_SCENE
 from confab.commands.options import (
     AS_JSON,
@@ -87,9 +87,8 @@ def fetch(url: str, folder: Path) -> None:
 def picture(scene: str, out: Path, behavior: str | None, classes: bool) -> None:
     """Draw the table with its places, a behaviour, or the classes."""
     from confab.picturing import draw
-    from confab.scene import load
 
-    print(draw(load(scene), out, behavior, classes))
+    print(draw(load_scene(scene), out, behavior, classes))
 
 
 @command(epilog=examples("validate"))
@@ -270,7 +269,6 @@ def export(
 ) -> None:
     """Export a level as PDDL, or a plan as trajectories or a tree."""
     from confab.reasoner.graph.knowledge import KnowledgeError
-    from confab.scene import load
 
     if trajectory and trees:
         raise KnowledgeError("--trajectory and --bt exclude each other; give one")
@@ -279,7 +277,6 @@ def export(
     if level is not None and (trajectory or trees):
         raise KnowledgeError("--level applies to PDDL only; trajectories and trees have primitives")
     if trajectory:
-        from confab.commands.given import load_scene, plan_in
         from confab.reasoner.files import check_replaceable
         from confab.trajectories import FORMATS, trajectories, write_trajectories
 
@@ -296,12 +293,12 @@ def export(
         raise KnowledgeError("--plan and --both-hands apply to trajectories; add --trajectory")
     with limited(time_limit):
         if trees:
-            paths = _exported_trees(load(scene), plan, goal, out)
+            paths = _exported_trees(load_scene(scene), plan, goal, out)
         else:
             from confab.pddl_commands import export_pddl
             from confab.timing import has_times
 
-            problem = load(scene).problem
+            problem = load_scene(scene).problem
             paths = export_pddl(problem, level, out)
             if has_times(problem):
                 remark("the PDDL has no durations, deadlines or windows of availability")

@@ -8,6 +8,8 @@ from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING
 
+import click
+
 from confab import ontology
 from confab.progress import progress
 from confab.reasoner.files import STDOUT
@@ -25,14 +27,26 @@ if TYPE_CHECKING:
     from confab.scene import Scene
 
 
-def load_scene(source: str, iri: str | None = None) -> Scene:
-    """Load a scene, and compute its reach facts if it has a robot's body; the source ``-`` is standard input."""
+def load_scene(source: str, iri: str | None = None, changed: bool = True) -> Scene:
+    """Load a scene, and compute its reach facts if it has a robot's body; the source ``-`` is standard input.
+
+    If `changed`, the scene has the facts of the option ``--fact``, and lacks the goals of ``--without-goal``.
+    """
     from confab.reaching import with_current_reach
     from confab.scene import load_text, read
 
     with progress(f"reading {'stdin' if source == '-' else source}"):
         scene = load_text(sys.stdin.buffer.read()) if source == "-" else read(source, scene=iri)
-    return with_current_reach(scene, remark)
+    scene = with_current_reach(scene, remark)
+    return with_changes(scene) if changed else scene
+
+
+def with_changes(scene: Scene) -> Scene:
+    """Return a scene with the facts of the option ``--fact``, and without the goals of the option ``--without-goal``."""
+    context = click.get_current_context(silent=True)
+    facts, goals = (context.meta.get(name) if context else None for name in ("with_fact", "without_goal"))
+    scene = scene.with_fact(*facts) if facts else scene
+    return scene.without_goal(*goals) if goals else scene
 
 
 def warn_of_errors(scene: Scene, deadline: Deadline) -> None:

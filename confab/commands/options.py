@@ -209,13 +209,49 @@ def QUIET(function: Any) -> Any:  # noqa: N802 - it is used like the constants t
     return _QUIET(_VERBOSE(function))
 
 
-SCENE = click.argument(
+_SCENE = click.argument(
     "scene",
     type=Text(A_SCENE),
     metavar="SCENE",
     shell_complete=scene_names,
     help="Shipped name, file, URL of a SPARQL endpoint, or - for stdin.",
 )
+
+
+def _changing(context: click.Context, option: click.Parameter, given: tuple[str, ...]) -> None:
+    context.meta[str(option.name)] = given
+
+
+_FACTS = click.option(
+    "--fact",
+    "with_fact",
+    multiple=True,
+    metavar="FACT",
+    expose_value=False,
+    callback=_changing,
+    help="A fact that replaces the scene's fact about its symbol, e.g. 'cup1 LOCATION location3'; repeatable.",
+)
+_WITHOUT_GOALS = click.option(
+    "--without-goal",
+    "without_goal",
+    multiple=True,
+    metavar="GOAL",
+    expose_value=False,
+    callback=_changing,
+    help="A goal of the scene to leave out, by its first words, e.g. 'cup1 LOCATION'; all: every goal; repeatable.",
+)
+
+
+def CHANGES(function: Any) -> Any:  # noqa: N802 - it is used like the constants that are options
+    """Add the options that change a scene to a command; `confab.commands.given.with_changes` applies them."""
+    return _FACTS(_WITHOUT_GOALS(function))
+
+
+def SCENE(function: Any) -> Any:  # noqa: N802 - it is used like the constants that are options
+    """Add the argument SCENE, and the options that change the scene, to a command."""
+    return _SCENE(CHANGES(function))
+
+
 SCENE_IRI = click.option(
     "--scene", "iri", type=Text(IRI), metavar="IRI", help="IRI of the scene at an endpoint with several scenes."
 )

@@ -23,6 +23,7 @@ from confab.commands.given import (
 from confab.commands.given import SCENE as A_SCENE
 from confab.commands.options import (
     AS_JSON,
+    CHANGES,
     GOALS,
     GUI,
     MEMORY_FILE,
@@ -126,7 +127,7 @@ def plan(
         if diff is not None:
             from confab.authoring import difference
 
-            changed = difference(load_scene(diff), loaded, mode)
+            changed = difference(load_scene(diff, changed=False), loaded, mode)
             show_result(changed.json() if as_json else str(changed))
             raise Exit(YES)
         remembered = memory_for(memory, no_memory, loaded)
@@ -158,6 +159,7 @@ def plan(
     shell_complete=scene_names,
     help="Shipped name, file, or URL of a SPARQL endpoint.",
 )
+@CHANGES
 @GOALS
 @MEMORY_FILE
 @MODE

@@ -231,17 +231,18 @@ def again_of(
     """Return the command that repeats a planning call, a verification or an execution."""
     path = scene.knowledge.path
     name = scene.iri if path is None else path.stem if path.is_relative_to(ontology.ROOT) else str(path)
+    changed = [name, *scene.knowledge.changes]
     if execution is not None:
         people = [part for i, _ in execution.episode.interventions for part in ("--intervene", i.text)]
-        return join(["confab", "execute", name, *(["--world", "pybullet"] if physical else []), *people])
+        return join(["confab", "execute", *changed, *(["--world", "pybullet"] if physical else []), *people])
     if report is not None:
         many, seed = len(report.rollouts), report.rollouts[0].seed
         given = {"--rollouts": many * (many > 1), "--seed": seed, "--noise": report.noise}
         options = [part for option, value in given.items() if value for part in (option, str(value))]
-        return join(["confab", "verify", name, "PLAN.json", *options, *(["--perturb"] if report.perturb else [])])
+        return join(["confab", "verify", *changed, "PLAN.json", *options, *(["--perturb"] if report.perturb else [])])
     first = scene.problem.goal
     goals = [str(Fact(symbol, value)) for symbol, value in sorted(problem.goal.items()) if first.get(symbol) != value]
-    return join(["confab", "plan", name, *(f"--goal={goal}" for goal in goals)])
+    return join(["confab", "plan", *changed, *(f"--goal={goal}" for goal in goals)])
 
 
 def small_print_of(outcome: Outcome | None) -> list[str]:

@@ -203,11 +203,9 @@ class Sheet:
         people = [self.intervention(each) for each in by.get("interventions", [])]
         if not (facts or goals or dropped or people):
             return f"confab plan {name}"
-        lines = [f"scene = confab.load({name!r})" + _called("with_fact", facts) + _called("with_goal", goals)]
-        if dropped:
-            lines.append(f"# without the goals of {', '.join(dropped)}")
-        lines.append(f"scene.execute(interventions={people!r})" if people else "scene.plan()")
-        return "\n".join(lines)
+        changes = _called("with_fact", facts) + _called("without_goal", dropped) + _called("with_goal", goals)
+        then = f"scene.execute(interventions={people!r})" if people else "scene.plan()"
+        return f"scene = confab.load({name!r}){changes}\n{then}"
 
 
 def _called(method: str, facts: Sequence[str]) -> str:

@@ -106,6 +106,8 @@ class KnowledgeGraph:
         A remote store that is queried instead of `store`; it is never changed.
     round_trips : int
         Number of queries so far.
+    changes : tuple of str
+        The changes of facts and goals since the files were read, as options of the command line.
     """
 
     scene: str
@@ -118,6 +120,7 @@ class KnowledgeGraph:
     compiled: set[ox.Triple] = field(default_factory=set)
     remote: Remote | None = None
     round_trips: int = 0
+    changes: tuple[str, ...] = ()
 
     def __getstate__(self) -> dict[str, object]:
         """Return the state for pickling and copying, with the store as N-Quads."""

@@ -186,6 +186,20 @@ def with_task(problem: Problem, parts: Parts, tasks: Iterable[str]) -> Problem:
     return replace(problem, goal=dict(sorted(goal.items())), weights=weights)
 
 
+def symbols_of(problem: Problem, parts: Parts, task: str, iri: str) -> set[Symbol]:
+    """Return the symbols of the goals that a goal node of a task denotes; several for a class, or for a conjunction."""
+    name = re.compile(rf"{re.escape(parts.names.short(iri))}(_\d+)?")
+    derived = {
+        symbol
+        for symbol in problem.goal
+        if symbol.arguments == (parts.names.short(task),) and name.fullmatch(symbol.situation)
+    }
+    if derived and _weight(parts, iri) is not None:
+        return derived
+    facts = [_symbol_of(wanted) for wanted in _wanted(parts, iri, problem.classes) if _is_fact(wanted, problem)]
+    return derived | problem.goal.keys() & facts
+
+
 def _symbol_of(wanted: Condition) -> Symbol | None:
     """Return the symbol of a goal that is about one symbol."""
     match wanted:

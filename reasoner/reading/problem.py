@@ -82,7 +82,7 @@ def read(graph: KnowledgeGraph, schema: OntologySchema | None = None) -> Reading
     KnowledgeError
         The scene is invalid: for example, a symbol has no value or two values, or a condition lacks a part.
     """
-    members = _members(graph)
+    members = members_of(graph)
     schema = read_schema(graph) if schema is None else schema
     facts = [stated(row, schema.numbers) for row in graph.select(FACTS, SCENE)]
     tuples = nodes_of(core_triple(row) for row in graph.select(TUPLES, SCENE))
@@ -93,12 +93,13 @@ def read(graph: KnowledgeGraph, schema: OntologySchema | None = None) -> Reading
 
 def read_names(graph: KnowledgeGraph) -> Names:
     """Return the short names that `read` would give to the terms of a whole scene, without reading facts."""
-    schema, members = read_schema(graph), _members(graph)
+    schema, members = read_schema(graph), members_of(graph)
     check("reading the scene")
     return names_of(schema, members)
 
 
-def _members(graph: KnowledgeGraph) -> list[Member]:
+def members_of(graph: KnowledgeGraph) -> list[Member]:
+    """Return the individuals of a graph with their classes and indices."""
     return [
         (text(who), text(kind), index_of(text(who), text(index))) for who, kind, index in graph.select(MEMBERS, SCENE)
     ]

@@ -5,7 +5,7 @@ A refutation (`confab.reasoner.refutations`) becomes a precondition.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from hashlib import sha256
 
@@ -16,14 +16,15 @@ from confab.reasoner.condition_nodes import Properties, equality_properties, sym
 from confab.reasoner.files import as_iri_part
 from confab.reasoner.graph.knowledge import BASE, SCENE, KnowledgeError, KnowledgeGraph, text
 from confab.reasoner.possible import ImpossibleStateError, refuse_derived, refuse_impossible
-from confab.reasoner.reading.problem import Reading
+from confab.reasoner.reading.frame import frame
+from confab.reasoner.reading.goals import symbols_of
+from confab.reasoner.reading.problem import Reading, members_of
 from confab.reasoner.refutations import Refutation
 from confab.reasoner.symbols import FALSE, TRUE, Fact, Symbol
 from confab.reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, LABEL, TYPE, XSD
 
 VALUE_PROPERTIES = "SELECT ?situation ?property WHERE { ?situation :valueProperty ?property }"
 STATED = "SELECT ?node ?property ?value WHERE { ?node a :SituatedObjectInstance ; ?property ?value }"
-WANTED = "SELECT ?node ?property ?value WHERE { ?task :goal ?node . ?node ?property ?value }"
 TASKS = "SELECT DISTINCT ?task WHERE { ?task a/rdfs:subClassOf* :Task } ORDER BY ?task"
 PARAMETERS = "SELECT ?behavior ?term WHERE { ?behavior :parameter ?term . ?term :index ?index } ORDER BY ?index"
 
@@ -56,7 +57,7 @@ def with_facts(graph: KnowledgeGraph, reading: Reading, facts: Sequence[Fact]) -
         if prop:
             pair = iri(symbol.situation) in reading.schema.pairs
             _remove(copy, about, ox.NamedNode(prop), ox.NamedNode(iri(symbol.arguments[1])) if pair else None)
-        for node in _about(copy, STATED, reading, symbol):
+        for node in _about(copy, reading, symbol):
             _remove(copy, node)
         added = said(reading, fact, prop, ox.BlankNode())
         copy.store.extend(ox.Quad(t.subject, t.predicate, t.object, ox.NamedNode(BASE + "asserted")) for t in added)
@@ -66,21 +67,59 @@ def with_facts(graph: KnowledgeGraph, reading: Reading, facts: Sequence[Fact]) -
 def with_goals(graph: KnowledgeGraph, reading: Reading, goals: Sequence[Fact]) -> KnowledgeGraph:
     """Return a copy of a graph in which the given goals replace the goals for the same symbols."""
     copy = _copied(graph)
+    others = _unstate_goals(copy, reading, {goal.symbol for goal in goals})
+    _state_goals(copy, reading, [*others, *goals])
+    return copy
+
+
+def _state_goals(graph: KnowledgeGraph, reading: Reading, goals: Sequence[Fact]) -> None:
+    """Add goals to the task of a graph."""
     asserted, link = ox.NamedNode(BASE + "asserted"), ox.NamedNode(CORE + "goal")
     task = next((text(row[0]) for row in graph.select(TASKS)), f"{graph.scene.rstrip('#/')}#task")
-    copy.add("asserted", [(task, TYPE, INDIVIDUAL), (task, TYPE, CORE + "Task")])
+    graph.add("asserted", [(task, TYPE, INDIVIDUAL), (task, TYPE, CORE + "Task")])
     for goal in goals:
-        for old in _about(copy, WANTED, reading, goal.symbol):
-            _remove(copy, None, link, old)
-            _remove(copy, old)
         for number, part in enumerate(goal.value.split(",")):  # two bounds of an amount are two goals
             name = ".".join(("goal", *goal.symbol.arguments, goal.symbol.situation, *[str(number)] * bool(number)))
             node = ox.NamedNode(f"{graph.scene.rstrip('#/')}#{as_iri_part(name)}")
-            copy.store.extend(
+            graph.store.extend(
                 ox.Quad(t.subject, t.predicate, t.object, asserted)
                 for t in (ox.Triple(ox.NamedNode(task), link, node), *_wanted(reading, replace(goal, value=part), node))
             )
+
+
+def without_goals(graph: KnowledgeGraph, reading: Reading, goals: Sequence[Fact]) -> KnowledgeGraph:
+    """Return a copy of a graph without the goals for the symbols of the given facts.
+
+    If a goal node states several goals, the other goals of the node are stated one by one.
+
+    Raises
+    ------
+    KnowledgeError
+        Another goal of such a node isn't a fact, or has a weight.
+    """
+    copy = _copied(graph)
+    _state_goals(copy, reading, _unstate_goals(copy, reading, {goal.symbol for goal in goals}))
     return copy
+
+
+def _unstate_goals(graph: KnowledgeGraph, reading: Reading, symbols: Collection[Symbol]) -> list[Fact]:
+    """Remove the nodes of the goals for some symbols from a graph; return the other goals of these nodes."""
+    problem, parts, others = reading.problem, frame(reading.schema, members_of(graph)).parts, set[Symbol]()
+    for task in reading.schema.of_kind("Task"):
+        for iri in parts.values(task, "goal"):
+            found = symbols_of(problem, parts, task, iri)
+            if found.isdisjoint(symbols):
+                continue
+            rest = sorted(found.difference(symbols))
+            if alone := [one for one in rest if one in problem.weights or parts.names.short(task) in one.arguments]:
+                raise KnowledgeError(
+                    f"<{iri}> states {len(found)} goals, of which '{alone[0]}' can't remain alone; also remove it"
+                )
+            others.update(rest)
+            node = ox.BlankNode(iri.removeprefix("_:")) if iri.startswith("_:") else ox.NamedNode(iri)
+            _remove(graph, None, ox.NamedNode(CORE + "goal"), node)
+            _remove(graph, node)
+    return [Fact(symbol, problem.goal[symbol]) for symbol in sorted(others)]
 
 
 def with_refuted(graph: KnowledgeGraph, reading: Reading, refutations: Sequence[Refutation]) -> KnowledgeGraph:
@@ -176,10 +215,10 @@ def _individual(node: ox.NamedNode, kind: str, label: str, properties: Propertie
     yield from triples(node, properties)
 
 
-def _about(graph: KnowledgeGraph, query: str, reading: Reading, symbol: Symbol) -> list[ox.NamedNode | ox.BlankNode]:
-    """Return the nodes of the conditions or facts about a symbol."""
+def _about(graph: KnowledgeGraph, reading: Reading, symbol: Symbol) -> list[ox.NamedNode | ox.BlankNode]:
+    """Return the nodes of the facts about a symbol."""
     nodes: dict[ox.NamedNode | ox.BlankNode, dict[str, str]] = {}
-    for node, prop, value in graph.select(query, SCENE):
+    for node, prop, value in graph.select(STATED, SCENE):
         if isinstance(node, ox.NamedNode | ox.BlankNode):
             nodes.setdefault(node, {})[text(prop).removeprefix(CORE)] = text(value)
     return [node for node, parts in nodes.items() if _symbol(parts, reading) == symbol]

@@ -97,6 +97,46 @@ def test_a_changed_fact_gives_a_new_scene_and_does_not_change_the_first(tmp_path
         scene.with_fact("cup1 LOCATION location77")
 
 
+def test_a_goal_is_left_out_by_its_first_words(scene: confab.Scene) -> None:
+    assert {*scene.goals} - {*scene.without_goal("cup1 LOCATION", "bottle2").goals} == {
+        "cup1 LOCATION location7",
+        "bottle2 LOCATION location3",
+    }
+    assert scene.without_goal().goals == scene.without_goal("all").goals == []
+    only = scene.without_goal().with_goal("cup2 LOCATION location5")
+    assert (
+        only.goals
+        == ["cup2 LOCATION location5"]
+        == list(scene.without_goal("cup1", "bottle1", "bottle2", "cup2 BEVERAGE").goals)
+    )
+    assert [str(step) for step in only.plan().plan] == ["28 B1_MOVE cup2 location5"]
+    with pytest.raises(
+        confab.KnowledgeError, match="no goal 'cup1 LOCATION location3'; did you mean 'cup1 LOCATION location7'"
+    ):
+        scene.without_goal("cup1 LOCATION location3")
+
+
+CONJUNCTION = """
+@prefix : <https://example.org/s#> . @prefix b: <https://w3id.org/confab/beverage-serving#> .
+@prefix c: <https://w3id.org/confab/core#> . @prefix k: <https://w3id.org/confab/tabletop#> .
+@prefix t: <https://w3id.org/confab/dining-table#> . @prefix owl: <http://www.w3.org/2002/07/owl#> .
+<https://example.org/s> a owl:Ontology ; owl:imports <https://w3id.org/confab/beverage-serving> .
+b:serving c:goal :both . :both a owl:NamedIndividual, c:AllOf ; c:condition :one, :other .
+:one a owl:NamedIndividual, c:ValueCondition ; c:about :cup ; c:situationType k:LOCATION ; c:value t:location1 .
+:other a owl:NamedIndividual, c:ValueCondition ; c:about :cup ; c:situationType k:BEVERAGE ; c:value b:beverage1 .
+:cup a owl:NamedIndividual, k:Cup ; k:location t:location6 ; k:beverage k:no_beverage .
+"""
+
+
+def test_the_other_goals_of_a_conjunction_stay_if_one_is_left_out_or_replaced() -> None:
+    scene = confab.load(CONJUNCTION)
+    assert {*scene.goals} - {*scene.without_goal("cup LOCATION").goals} == {"cup LOCATION location1"}
+    assert {*scene.goals} ^ {*scene.with_goal("cup LOCATION location8").goals} == {
+        "cup LOCATION location1",
+        "cup LOCATION location8",
+    }
+
+
 def test_a_scene_without_a_task_can_be_given_a_goal(tmp_path: Path) -> None:
     write_scene(tmp_path / "s.ttl", "served", 4)
     text = (tmp_path / "s.ttl").read_text()

@@ -1,6 +1,8 @@
 """Planning from observed facts, and planning with a proved bound."""
 
+import json
 from dataclasses import fields
+from html import unescape
 from inspect import signature
 from pathlib import Path
 from typing import cast, get_args
@@ -58,6 +60,26 @@ def test_python_the_command_line_and_agents_have_the_same_options_of_a_planning_
     ] == options
     written = {parameter.name for parameter in plan.params} | {"leave_levels"}
     assert {*options} <= written
+
+
+def test_facts_and_goals_are_changed_on_the_command_line_as_in_python(
+    scene: confab.Scene, capsys: pytest.CaptureFixture[str]
+) -> None:
+    changes = ["--fact", "cup1 LOCATION location6", "--without-goal", "cup2", "--without-goal", "bottle1"]
+    with pytest.raises(SystemExit, match="0"):
+        cli.main(["plan", "beverage-serving", *changes, "--json"])
+    shown = json.loads(capsys.readouterr().out)
+    changed = scene.with_fact("cup1 LOCATION location6").without_goal("cup2", "bottle1")
+    assert shown["steps"] == json.loads(json.dumps(changed.plan().json()["steps"]))
+    with pytest.raises(SystemExit, match="1"):
+        cli.main(["query", "beverage-serving", *changes, "ASK { :serving c:goal ?goal . ?goal c:about :cup2 }"])
+
+
+def test_the_command_of_a_page_repeats_the_call_in_the_changed_scene(tmp_path: Path, scene: confab.Scene) -> None:
+    changed = scene.without_goal("cup1 BEVERAGE").with_fact("cup1 LOCATION location6")
+    page = changed.plan().report(tmp_path / "page.html").read_text()
+    again = "--without-goal=cup1 BEVERAGE beverage1' '--fact=cup1 LOCATION location6'"
+    assert f"confab plan beverage-serving '{again}" in unescape(page)
 
 
 def test_the_mode_and_the_option_of_the_optimal_search_are_one(scene: confab.Scene) -> None:
