@@ -13,15 +13,15 @@ OVERVIEW: Mapping[str, str] = {
     "confab": "to begin: confab.load(SCENE), confab.scenes(), confab.new_domain(NAME), confab.generate(FAMILY), "
     "confab.validate(FILE); with scene = confab.load(SCENE), to read: scene.facts, scene.objects, scene.goals, scene.behaviors, "
     "scene.query(TEXT); to change: scene.with_fact(FACT), scene.with_goal(FACT), scene.without_goal(GOAL); to plan: scene.plan(), "
-    "scene.explain(); to try: scene.verify(), scene.execute(); to show: scene.picture(FILE), scene.plan().report(FILE), scene.serve(); to learn: "
-    "confab.Memory.of(SCENE), confab.Memory.load(FILE), confab.practise(SCENES); to limit time: confab.within(SECONDS); also: "
-    "Memory, Scene, Result, Report, Execution, Table, Curve, KnowledgeError, __version__",
+    "scene.explain(); to try: scene.verify(), scene.execute(); to show: scene.picture(FILE), scene.plan().report(FILE), "
+    "scene.serve(); to learn: confab.Memory.of(SCENE), confab.Memory.load(FILE), confab.practise(SCENES); to limit time: "
+    "confab.within(SECONDS); also: Memory, Scene, Result, Report, Execution, Table, Curve, KnowledgeError, __version__",
     "scene": "to read: facts, objects, goals, behaviors, problem.classes, problem.domain.situations, embodiment, title; to ask: "
-    "query(TEXT), affordances(OBJECT), explain(); to change (a copy): with_fact(FACT), with_goal(FACT), without_goal(GOAL); to plan: "
-    "plan(); to try: verify(), execute(); to show: picture(FILE), board(), serve(), plan().report(FILE); to save: save(FILE), "
-    "export(FOLDER), to_pddl(); to read files: read_plan(FILE), read_result(FILE), read_episode(FILE), read_report(FILE, PLAN); "
-    "to use libraries: graph, owl, to_unified_planning(); also: iri, with_episodes(FILE), problem, knowledge, names, seconds, "
-    "reading, read_whole, settle, construct, applicable_query, quantifying_query, update_of",
+    "query(TEXT), affordances(OBJECT), explain(); to change (a copy): with_fact(FACT), with_goal(FACT), without_goal(GOAL); to "
+    "plan: plan(); to try: verify(), execute(); to show: picture(FILE), board(), serve(), plan().report(FILE); to save: "
+    "save(FILE), export(FOLDER), to_pddl(); to read files: read_plan(FILE), read_result(FILE), read_episode(FILE), "
+    "read_report(FILE, PLAN); to use libraries: graph, owl, to_unified_planning(); also: iri, with_episodes(FILE), problem, "
+    "knowledge, names, seconds, reading, read_whole, settle, construct, applicable_query, quantifying_query, update_of",
     "result": "to read: solved, cost, seconds, goals, outcome.status, outcome.reason, outcome.bound, outcome.search, timed, "
     "soft_goals; to walk: plan.steps, plan.primitives, plan.length, plan.at_level(LEVEL); to ask: why(STEP), why_not(WHAT), "
     "explain(), labels, purposes, dearer(), certificate; to try: verify(), execute(); to show: print(result), report(FILE), "

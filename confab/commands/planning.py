@@ -206,6 +206,7 @@ def run(
     metavar="[PLAN.json]",
     help="Output of 'confab plan --json', or a plan in PDDL; by default a new plan.",
 )
+@GOALS
 @click.option(
     "--rollouts", type=click.IntRange(min=1), default=1, metavar="N", help="Number of rollouts, with seeds S, S+1, …"
 )
@@ -229,6 +230,7 @@ def run(
 def verify(
     scene: str,
     plan: Path | None,
+    goal: tuple[str, ...],
     rollouts: int,
     seed: int,
     noise: float,
@@ -249,6 +251,7 @@ def verify(
         json_file(out)
     with limited(time_limit), counted(rollouts) as done:
         loaded = load_scene(scene)
+        loaded = loaded.with_goal(*goal) if goal else loaded
         report = loaded.verify(
             None if plan is None else plan_in(plan, loaded),
             rollouts,
