@@ -30,9 +30,9 @@ from worlds.scenes import scene
 from worlds.shrinking import shrunk
 
 FIRST, COUNT, STRETCH = 1_000_000, 1_000, 250
-CONSTRAINED, MUTUAL, PRICED = 0.3, 0.2, 0.2
-"""Shares of worlds with a constraint on every state, with situation types that define each other, and with costs that depend on
-amounts."""
+SHARES = {"constrained": 0.3, "mutual": 0.2, "priced": 0.2, "everyone": 0.1}
+"""Shares of worlds with a constraint on every state, with situation types that define each other, with costs that depend on
+amounts, and with a goal about all individuals of a class."""
 SHRUNK = 2
 """Number of worlds that each process shrinks for each kind of fault."""
 SHOWN, MUTANTS = 6, 100
@@ -49,7 +49,7 @@ def signature(one: Complaint) -> str:
 
 def judged(seed: int, folder: Path, every: bool = False) -> Judged:
     """Judge the world of a seed, and return the result."""
-    return Judge(mixed(seed, constrained=CONSTRAINED, mutual=MUTUAL, priced=PRICED), folder, every).judged()
+    return Judge(mixed(seed, **SHARES), folder, every).judged()
 
 
 def stretch(first: int, count: int, into: Path | None, known: dict[str, int]) -> dict[str, Any]:
@@ -61,7 +61,7 @@ def stretch(first: int, count: int, into: Path | None, known: dict[str, int]) ->
     }  # fmt: skip
     with TemporaryDirectory() as folder:
         for seed in range(first, first + count):
-            world, meant = drawn(seed, constrained=CONSTRAINED, mutual=MUTUAL, priced=PRICED)
+            world, meant = drawn(seed, **SHARES)
             its = Judge(world, Path(folder), meant=meant).judged()
             note(found, seed, world, its)
             for one in its.complaints:
@@ -230,7 +230,7 @@ def main(arguments: Sequence[str] = ()) -> int:
     if asked.seed is not None:
         with TemporaryDirectory() as folder:
             its = judged(asked.seed, Path(folder), every=True)
-        print(scene(mixed(asked.seed, constrained=CONSTRAINED, mutual=MUTUAL, priced=PRICED)))
+        print(scene(mixed(asked.seed, **SHARES)))
         print(f"# least {its.least}, states {its.states}, {its.status}")
         for one in (*its.complaints, *its.remarks):
             print(f"# {one.kind} ({one.mode}): {one.text}")

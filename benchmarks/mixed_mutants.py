@@ -20,6 +20,7 @@ import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from inspect import CO_OPTIMIZED
 from itertools import accumulate, islice
@@ -30,20 +31,24 @@ from time import process_time
 from types import CodeType, FunctionType
 from typing import Any, TypedDict
 
+from benchmarks.mixed import SHARES
 from benchmarks.mutants import LIBRARIES, ROOT, Instead, faults, meaning
 from confab.planner.certificates import Certificate
 from confab.reasoner.symbols import Problem
-from confab.scene import load
+from confab.scene import Scene, load
 from worlds import judging
 from worlds.false_certificates import accepted, corrupted, of_a_task_with_a_plan
-from worlds.interpreter import Interpreter, TooManyStatesError
+from worlds.interpreter import Interpreter
 from worlds.mixed import RandomWorld, drawn
 from worlds.scenes import scene
 
 CHECKERS = sorted(f"planner/{file.name}" for file in (ROOT / "planner").glob("checked_*.py"))
 PARTS: dict[str, dict[str, str]] = {
     "recognition": {"reasoner/reading/relevance.py": "recognition"},
-    "proofs": {"planner/hierarchical/unsolvability.py": "guarded proofs", "planner/certifying.py": "proofs"},
+    "proofs": {
+        "planner/hierarchical/unsolvability.py": "guarded paper optimal proofs",
+        "planner/certifying.py": "proofs",
+    },
     "checker of plans": dict.fromkeys(("planner/validation.py", *CHECKERS), "checker"),
     "checker of certificates": dict.fromkeys(
         ("planner/certificate_checks.py", "planner/possibilities.py"), "certificates"
@@ -53,15 +58,12 @@ PARTS: dict[str, dict[str, str]] = {
 
 A planner that gives up in a world without a plan counts as a fault of a proof.
 """
-FIRST, WORLDS = 8_000_000, 120
+FIRST, WORLDS = 8_000_000, 200
 """First seed and number of worlds."""
 BUDGET, PLANS = 4.0, 6
 """CPU seconds of the worlds that are judged with a fault, as measured without the fault; number of changed copies of each plan."""
 SECONDS, WAITING = 60, 600.0
 """CPU seconds for the worlds of a fault, and seconds by the clock for a call on a busy machine."""
-CONSTRAINED, MUTUAL, PRICED = 0.3, 0.2, 0.2
-"""Shares of worlds with a constraint on every state, with situation types that define each other, and with costs that depend on
-amounts."""
 NOWHERE = "in no world: "
 """Result of a fault in a statement that no world executes."""
 NOTED = "_noted_lines"
@@ -93,9 +95,7 @@ def kills(many: int, into: Path, chosen: Sequence[str] = ()) -> None:
     into.mkdir(parents=True, exist_ok=True)
     record = into / "mixed-mutants.json"
     known: dict[str, Record] = json.loads(record.read_text("utf-8")) if record.is_file() else {}
-    worlds = [
-        drawn(seed, constrained=CONSTRAINED, mutual=MUTUAL, priced=PRICED) for seed in range(FIRST, FIRST + WORLDS)
-    ]
+    worlds = [drawn(seed, **SHARES) for seed in range(FIRST, FIRST + WORLDS)]
     its_judge = [*sorted((ROOT / "worlds").glob("*.py")), Path(__file__)]
     judge = hashed("".join(file.read_text("utf-8") for file in its_judge))
     print("| part | module | faults tried | noticed | in no world | share of the others |\n|---|---|---|---|---|---|")
@@ -170,14 +170,6 @@ def statement(source: str, line: int) -> set[int]:
                 found, within = set(range(first, end + 1)), inside
             waiting.append((child, inside or isinstance(child, ast.FunctionDef)))
     return found if within else set()
-
-
-def no_plan(meant: Interpreter) -> bool:
-    """Return whether a world has no plan."""
-    try:
-        return meant.explored(meant.problem.domain.levels[-1], 2_000).least is None
-    except TooManyStatesError:
-        return False
 
 
 def within_budget(seeds: Sequence[int], before: Mapping[int, Traced]) -> list[int]:
@@ -290,10 +282,11 @@ def forked(run: Callable[[Callable[[object], None]], None], seconds: int | None)
 
 
 def check(world: RandomWorld, meant: Interpreter, mode: str) -> Check:
-    """Return the check of a world in a mode; for a checker, its plans or certificates are made now."""
+    """Return the check of a world in a mode. Everything that needs no faulty module is made now, once for all faults.
+
+    A result that is the same as without a fault isn't judged again.
+    """
     judging.SECONDS = WAITING
-    if mode not in ("checker", "certificates"):
-        return lambda: judged(world, meant, mode)
     with TemporaryDirectory() as folder:
         judge = judging.Judge(world, Path(folder), only=mode, meant=meant)
         judge.truth()
@@ -303,34 +296,79 @@ def check(world: RandomWorld, meant: Interpreter, mode: str) -> Check:
         problem = None if read is None else judge.call("read", lambda: read.reading.problem)
         if read is None or problem is None:
             return list
-        outcome = judge.outcome(read, "guarded") if mode == "checker" else None
-    if mode == "checker":
-        plans = [outcome.plan] if outcome is not None and outcome.plan is not None else []
+        its = {"recognition": recognition, "checker": plans, "certificates": certificates}.get(mode)
+        run = proofs(judge, read, mode) if its is None else its(judge, read, file)
 
-        def check_plans() -> list[str]:
-            judge.found.complaints.clear()
-            judge.rng = Random(world.seed)
-            judge.call(mode, lambda: judge.states(problem, PLANS))
-            judge.call(mode, lambda: judge.checker(problem, plans, PLANS))
-            return [one.kind for one in judge.found.complaints]
+    def complaints() -> list[str]:
+        found = judge.found
+        judge.found = judging.Judged(least=found.least, known=found.known)
+        judge.rng = Random(world.seed)
+        run()
+        said, judge.found = [*judge.found.complaints, *judge.found.remarks], found
+        kept = (one for one in said if one.kind != "gave-up" or (found.known and found.least is None))
+        return sorted({f"{one.kind} {one.mode}" for one in kept})
 
-        return check_plans
-    certificates = list(certificates_of(problem, judge, Random(world.seed)))
-    return lambda: [
-        f"{number} {what}"
-        for number, (what, one, right) in enumerate(certificates)
-        if accepted(problem, what, one) is not right
-    ]
+    return complaints
 
 
-def judged(world: RandomWorld, meant: Interpreter, mode: str) -> list[str]:
-    """Judge a world in one or several modes, and return the complaints."""
-    with TemporaryDirectory() as folder:
-        every = [judging.Judge(world, Path(folder), only=one, meant=meant).judged() for one in mode.split()]
-    hopeless = no_plan(meant)
-    said = [one for its in every for one in (*its.complaints, *its.remarks)]
-    kept = (one for one in said if one.kind != "gave-up" or hopeless)
-    return sorted({f"{one.kind} {one.mode}" for one in kept})
+def recognition(judge: judging.Judge, read: Scene, file: Path) -> Callable[[], None]:
+    """Return the check of recognition in a world."""
+    slices = [*judge.slices(read), *judge.crowd(file)]
+    renamed = judge.renamed(file)
+    usual = [one.part().problem for one in slices]
+
+    def compare() -> None:
+        for one, problem in zip(slices, usual, strict=True):
+            part = one.part()
+            if part.problem != problem and one.wrong(part):
+                judge.complain("the part of the scene differs", "recognition")
+
+    def run() -> None:
+        judge.call("recognition", compare)
+        judge.call("recognition of names", lambda: judge.names(renamed))
+
+    return run
+
+
+def proofs(judge: judging.Judge, read: Scene, modes: str) -> Callable[[], None]:
+    """Return the check of the proofs, and of planning in some modes, in a world."""
+    problem, options = read.reading.problem, {"guarded": {}, "paper": {"mode": "paper"}, "optimal": {"mode": "optimal"}}
+    kinds = () if "guarded" in modes else ("all", *judging.KINDS)
+    usual = {kind: [judge.call(kind, partial(judging.certificate, kind, problem))] for kind in kinds}
+
+    def run() -> None:
+        for mode in options.keys() & modes.split():
+            judge.outcome(read, mode, **options[mode])
+        for kind, known in usual.items():
+            judge.call(f"proofs by {kind}", partial(judge.proof, problem, kind, known))
+        judge.call("proofs by a search", lambda: judge.searched(problem))
+
+    return run
+
+
+def plans(judge: judging.Judge, read: Scene, _: Path) -> Callable[[], None]:
+    """Return the check of the checker of plans with a plan of a world."""
+    problem, outcome = read.reading.problem, judge.outcome(read, "guarded")
+    made = [outcome.plan] if outcome is not None and outcome.plan is not None else []
+
+    def run() -> None:
+        judge.call("checker", lambda: judge.states(problem, PLANS))
+        judge.call("checker", lambda: judge.checker(problem, made, PLANS))
+
+    return run
+
+
+def certificates(judge: judging.Judge, read: Scene, _: Path) -> Callable[[], None]:
+    """Return the check of the checker of certificates with certificates of a world."""
+    problem = read.reading.problem
+    made = list(certificates_of(problem, judge, Random(judge.world.seed)))
+
+    def run() -> None:
+        for number, (what, one, right) in enumerate(made):
+            if accepted(problem, what, one) is not right:
+                judge.complain(f"{number} {what}", "certificates")
+
+    return run
 
 
 def certificates_of(problem: Problem, judge: judging.Judge, rng: Random) -> Iterator[tuple[str, Certificate, bool]]:

@@ -11,7 +11,7 @@ import re
 import signal
 import warnings
 import zlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -22,7 +22,6 @@ from random import Random
 from time import process_time
 from types import FrameType
 from typing import Any, TypeVar
-from unittest.mock import patch
 
 from confab.plan_options import NO_ENGINE
 from confab.planner.acting.episode import End
@@ -31,7 +30,7 @@ from confab.planner.plan import Outcome, Plan, Reason, Status, UnsolvableError
 from confab.planner.validation import LoggedState, successor, validate
 from confab.planning import plan
 from confab.reasoner.amounts import written
-from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
 from confab.reasoner.language import DomainError
 from confab.reasoner.limits import LimitError
 from confab.reasoner.reading import relevance
@@ -44,7 +43,7 @@ from worlds.false_certificates import corrupted as corrupted_certificates
 from worlds.interpreter import Interpreter, State, TooManyStatesError
 from worlds.mixed import RandomWorld, crowded
 from worlds.scenes import scene
-from worlds.slices import difference
+from worlds.slices import Slice
 from worlds.walking import cost, faults
 
 SECONDS, CPU = 3.0, 4.0
@@ -291,9 +290,9 @@ class Judge:
         if self.sampled(EXECUTIONS, "execute", "execute"):
             self.execution(read, guarded)
         if self.sampled(RECOGNITION, "recognition", "recognition"):
-            self.call("recognition", lambda: self.recognition(read))
-            self.call("recognition of names", lambda: self.names(file))
-            self.call("recognition of a crowd", lambda: self.crowd(file))
+            self.call("recognition", lambda: self.recognition(self.slices(read)))
+            self.call("recognition of names", lambda: self.names(self.renamed(file)))
+            self.call("recognition of a crowd", lambda: self.recognition(self.crowd(file)))
 
     def outcome(self, read: Scene, name: str, **options: Any) -> Outcome | None:
         """Plan in one mode, compare the outcome with the exhaustive search, and return the outcome."""
@@ -457,48 +456,48 @@ class Judge:
                     self.complain("the checker has another successor", "checker", f"{name} {arguments} in {before}")
                     return
 
-    def recognition(self, read: Scene) -> None:
-        """Compare the part of the scene that task recognition selects with the whole scene, for the task and for another goal.
+    def recognition(self, slices: Iterable[Slice]) -> None:
+        """Compare parts of scenes that task recognition selects with the whole scenes."""
+        for one in slices:
+            if said := one.wrong(one.part()):
+                text = f"{one.goals}, {one.queries} queries: {said}"
+                self.complain("the part of the scene differs", "recognition", text)
 
-        A larger world of the same seed is compared, too. The last query of recognition, which follows all routes at once, is
-        needed after few other queries only.
-        """
+    def slices(self, read: Scene) -> Iterator[Slice]:
+        """Yield the comparisons of task recognition with the whole scene, for the task and for another goal."""
         states = self.rng.sample(self.reached, min(len(self.reached), SLICED)) or [self.meant.initial]
-        self.part(read, self.meant, states, [])
-        self.part(read, *self.other_goal(states))
+        yield Slice(read.knowledge, (), self.queries(), self.meant, states, MOST)
+        meant, goals = self.other_goal(states)
+        yield Slice(read.knowledge, goals, self.queries(), meant, states, MOST)
 
-    def crowd(self, file: Path) -> None:
-        """Compare the part of a larger world with that world."""
+    def crowd(self, file: Path) -> Iterator[Slice]:
+        """Yield the comparison of task recognition with the whole scene in a larger world of the same seed."""
         world, meant, states = crowded(self.world.seed, constrained=0.3)
         file.write_text(scene(world), encoding="utf-8")
-        self.part(load(file), meant, states[:: 1 + len(states) // SLICED], [], MOST // 100)
+        few = states[:: 1 + len(states) // SLICED]
+        yield Slice(load(file).knowledge, (), self.queries(), meant, few, MOST // 100)
 
-    def part(self, read: Scene, meant: Interpreter, states: list[State], goals: list[str], most: int = MOST) -> None:
-        """Compare the part of a scene that task recognition selects for goals with the whole scene."""
-        few = self.rng.choice((2, 3, relevance.ROUNDS))
-        with patch.object(relevance, "ROUNDS", few):
-            part = relevance.recognise(read.knowledge, goals)
-        said = "" if part.whole else difference(meant, Interpreter(part.problem), states, most)
-        if said:
-            self.complain("the part of the scene differs", "recognition", f"{goals}, {few} queries: {said}")
+    def queries(self) -> int:
+        """Return a number of queries; recognition needs its last query, which follows all routes, only after few other queries."""
+        return self.rng.choice((2, 3, relevance.ROUNDS))
 
-    def other_goal(self, states: list[State]) -> tuple[Interpreter, list[State], list[str]]:
-        """Return an interpreter of the world with another goal, from a state, with the states and with the text of the goal."""
+    def other_goal(self, states: list[State]) -> tuple[Interpreter, list[str]]:
+        """Return an interpreter of the world with another goal, from a state, and the text of the goal."""
         symbols = [s for s, slot in self.meant.slots.items() if slot < self.meant.stated and not self.amount(s)]
         if not symbols:
-            return self.meant, states, []
+            return self.meant, []
         changed = [s for s in symbols if self.meant.value(states[0], s) != self.meant.value(self.meant.initial, s)]
         symbol = self.rng.choice(changed or symbols)
         value = self.meant.value(states[0], symbol)
         words = symbol.arguments[0], symbol.situation, *symbol.arguments[1:], value
-        return self.meant.wanting({**self.meant.problem.goal, symbol: value}), states, [" ".join(words)]
+        return self.meant.wanting({**self.meant.problem.goal, symbol: value}), [" ".join(words)]
 
     def amount(self, symbol: Symbol) -> bool:
         """Return whether a symbol has a number."""
         return self.meant.kinds[symbol.situation].quantity is not None
 
-    def names(self, file: Path) -> None:
-        """Compare the names in the part with those in the whole scene, with other terms that have the same local names.
+    def renamed(self, file: Path) -> KnowledgeGraph:
+        """Write and load a variant of the scene with other terms that have the local names of its terms.
 
         A prefix or only an import leads to the other terms. An individual has the name of a class of the core ontology.
         """
@@ -516,11 +515,14 @@ class Judge:
         head = "@prefix owl: <http://www.w3.org/2002/07/owl#> .\n<https://example.org/other> a owl:Ontology ."
         (self.folder / "other.ttl").write_text("\n".join([head, *lines]), encoding="utf-8")
         file.write_text(prefix + text, encoding="utf-8")
-        knowledge = load(file).knowledge
+        return load(file).knowledge
+
+    def names(self, knowledge: KnowledgeGraph) -> None:
+        """Compare the names in the part of a scene that recognition selects with those in the whole scene."""
         part, whole = relevance.recognise(knowledge), read_names(knowledge)
         used = {name for of, its in part.problem.classes.items() if its for name in (of, *its) if name in part.names}
         if wrong := {name: other for name in used if (other := whole.short(part.names.iri(name))) != name}:
-            self.complain("the part of the scene has other names", "recognition", f"{wrong} {prefix}{lines}")
+            self.complain("the part of the scene has other names", "recognition", wrong)
 
     def proofs(self, read: Scene) -> None:
         """Certify the task without a search, and judge the certificates without the planner.
@@ -530,28 +532,30 @@ class Judge:
         each task without a plan, and certificates of facts and of pairs for some of these tasks, so a missing certificate is a
         remark. The checker must reject certificates that have lost a claim or have a false one.
         """
+        for kind in ("all", *KINDS):
+            self.call(f"proofs by {kind}", partial(self.proof, read.reading.problem, kind))
+        self.call("proofs by a search", lambda: self.searched(read.reading.problem))
+
+    def proof(self, problem: Problem, kind: str, known: Sequence[Certificate | None] = ()) -> None:
+        """Judge the certificate of one kind, unless it is one of the known certificates."""
         from confab.planner.certificate_checks import refusal
 
-        def judged(kind: str) -> None:
-            problem, found, mode = read.reading.problem, self.found, f"proofs by {kind}"
-            one = certificate(kind, problem)
-            if one is None:
-                if found.known and found.least is None:
-                    found.remarks.append(Complaint("no certificate", mode, ""))
-                return
-            if found.least is not None and self.surely is not None:
-                self.complain("a certificate although there is a plan", mode, one)
-            if said := refusal(problem, one):
-                self.complain("a certificate that its checker rejects", mode, f"{said}: {one}")
-            self.claims(mode, one)
-            if one.cases <= FEW_CASES:
-                for what, false in corrupted_certificates(problem, one, self.rng):
-                    if accepted(problem, what, false):
-                        self.complain("a false certificate is accepted", mode, f"{what}: {false}")
-
-        for kind in ("all", *KINDS):
-            self.call(f"proofs by {kind}", partial(judged, kind))
-        self.call("proofs by a search", lambda: self.searched(read.reading.problem))
+        one, found, mode = certificate(kind, problem), self.found, f"proofs by {kind}"
+        if one in known:
+            return
+        if one is None:
+            if found.known and found.least is None:
+                found.remarks.append(Complaint("no certificate", mode, ""))
+            return
+        if found.least is not None and self.surely is not None:
+            self.complain("a certificate although there is a plan", mode, one)
+        if said := refusal(problem, one):
+            self.complain("a certificate that its checker rejects", mode, f"{said}: {one}")
+        self.claims(mode, one)
+        if one.cases <= FEW_CASES:
+            for what, false in corrupted_certificates(problem, one, self.rng):
+                if accepted(problem, what, false):
+                    self.complain("a false certificate is accepted", mode, f"{what}: {false}")
 
     def searched(self, problem: Problem) -> None:
         """Judge the proofs by relaxed reachability and by the examination of all states, which other proofs hide."""

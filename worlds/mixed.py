@@ -96,15 +96,17 @@ def drawn(
     remembered: float = 0.0,
     mutual: float = 0.0,
     priced: float = 0.0,
+    everyone: float = 0.0,
 ) -> tuple[RandomWorld, Interpreter]:
     """Return the random world of a seed, and an interpreter of the world.
 
     Parameters
     ----------
     seed : int
-    aggregated, constrained, remembered, mutual, priced : float
+    aggregated, constrained, remembered, mutual, priced, everyone : float
         The shares of worlds with derived amounts, with constraints on every state, with remembered situation types, with two
-        situation types that define each other, and with behaviours whose costs depend on amounts.
+        situation types that define each other, with behaviours whose costs depend on amounts, and with a goal about all
+        individuals of a class.
     """
     rng = Random(f"mixed {seed}")
     most, least = (MOST, FEW if rng.random() < 0.5 else 2) if rng.random() > UNBOUNDED else (MOST // 10, 0)
@@ -121,7 +123,7 @@ def drawn(
             continue
         goal = _Wishes(rng, interpreter, {node[0]: cost for node, cost in costs.items()}).goal(rng.random() < EXCLUDED)
         if goal:
-            meant = interpreter.wanting(goal)
+            meant = _of_everyone(seed, interpreter.wanting(goal), everyone)
             return _with_derived_goal(replace(world, problem=meant.problem), meant)
 
 
@@ -151,6 +153,19 @@ def crowded(seed: int, constrained: float = 0.0) -> tuple[RandomWorld, Interpret
             goal = {symbol: value if isinstance(value, str) else written(value)}
             meant = meant.wanting(goal)
             return replace(world, problem=meant.problem), meant, states
+
+
+def _of_everyone(seed: int, meant: Interpreter, share: float) -> Interpreter:
+    """Return an interpreter; in a share of the worlds, a goal is required of all individuals of its class."""
+    problem = meant.problem
+    if Random(f"everyone {seed}").random() >= share:
+        return meant
+    for symbol, value in problem.goal.items():
+        kind = problem.domain.situations[symbol.situation]
+        if len(kind.arguments) == 1 and kind.quantity is None:
+            everyone = {Symbol(kind.name, (one,)): value for one in problem.classes[kind.arguments[0]]}
+            return meant.wanting(dict(sorted({**problem.goal, **everyone}.items())))
+    return meant
 
 
 def _with_derived_goal(world: RandomWorld, meant: Interpreter) -> tuple[RandomWorld, Interpreter]:

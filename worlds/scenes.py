@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
+from random import Random
 
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, bounds, written
 from confab.reasoner.derivation import TASK
@@ -20,6 +21,7 @@ from confab.reasoner.symbols import (
     RelationCondition,
     Rule,
     SituationType,
+    Symbol,
     ValueCondition,
     ValueEffect,
     Witness,
@@ -40,6 +42,8 @@ HEADER = """\
 <https://example.org/w> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> ; c:symbolicOnly true ;
   dcterms:title "w"@en ; dcterms:description "w"@en .
 """
+CONTRARY = {"<": ">=", "<=": ">", ">=": "<", ">": "<="}
+"""The sign of the negation of a comparison."""
 
 
 def scene(world: RandomWorld) -> str:
@@ -65,6 +69,7 @@ class _Scene:
         self.nodes: list[str] = []
         self.terms: dict[str, str] = {}
         self.where, self.count = "", 0
+        self.rng = Random(f"goals {world.seed}")
 
     def lines(self) -> Iterator[str]:
         yield from self.classes()
@@ -246,9 +251,23 @@ class _Scene:
             said = [first, f"c:about {self.put(subject)}", f"c:value {self.put(target)}"]
             return [*said, "c:negated true"] if value == FALSE else said
         said = [first, *self.arguments(arguments)]
-        if self.situations[situation].boolean and value == FALSE and len(situation) % 2:
+        if self.situations[situation].boolean and value == FALSE and sum(map(ord, situation)) % 2:
             return [*said, "c:negated true"]
         return said if value == TRUE else [*said, f"c:value {self.put(value)}"]
+
+    def wanted(self, symbol: Symbol, value: str) -> list[str]:
+        """Return the properties that state a goal; a negated goal excludes the only other value of the symbol."""
+        others = [
+            other for other in self.problem.classes.get(self.situations[symbol.situation].range, ()) if other != value
+        ]
+        if (
+            len(others) == 1
+            and self.problem.value_levels.keys().isdisjoint((*others, value))
+            and self.rng.random() < 0.4
+        ):
+            said = self.said(symbol.situation, symbol.arguments, others[0])
+            return said[:-1] if said[-1] == "c:negated true" else [*said, "c:negated true"]
+        return self.said(symbol.situation, symbol.arguments, value)
 
     def condition(self, one: Condition) -> str:
         """Write a condition with its nested conditions, and return the IRI of the condition."""
@@ -363,8 +382,8 @@ class _Scene:
 
     def task(self) -> Iterator[str]:
         self.begin("task", ())
-        goals = []
-        for symbol, value in self.problem.goal.items():
+        goals, hard = list[str](), list[str]()
+        for symbol, value in self.goals():
             weight = self.problem.weights.get(symbol)
             soft = [] if weight is None else [f"c:weight {_decimal(weight)}"]
             if symbol.arguments == ("task",):
@@ -375,12 +394,29 @@ class _Scene:
                     " ; ".join([self.nodes[-1].replace(node, goals[-1], 1).removesuffix(" ."), *soft]) + " ."
                 )
                 continue
+            found = goals if soft else hard
             if self.situations[symbol.situation].quantity is None:
-                said = self.said(symbol.situation, symbol.arguments, value)
-                goals.append(self.part("ValueCondition", *said, *soft))
+                found.append(self.part("ValueCondition", *self.wanted(symbol, value), *soft))
                 continue
             for sign, limit in bounds(value):
                 said = [f"c:situationType :{symbol.situation}", *self.arguments(symbol.arguments), *soft]
-                goals.append(self.part("Comparison", *said, f'c:sign "{sign}"', f"c:amount {_decimal(limit)}"))
-        yield self.node("task", "owl:NamedIndividual, c:Task", f"c:goal {', '.join(goals)}")
+                if sign in CONTRARY and self.rng.random() < 0.2:
+                    sign, said = CONTRARY[sign], [*said, "c:negated true"]
+                found.append(self.part("Comparison", *said, f'c:sign "{sign}"', f"c:amount {_decimal(limit)}"))
+        if len(hard) > 1 and self.rng.random() < 0.1:
+            hard = [self.part("AllOf", f"c:condition {', '.join(hard)}")]
+        yield self.node("task", "owl:NamedIndividual, c:Task", f"c:goal {', '.join([*goals, *hard])}")
         yield from self.nodes
+
+    def goals(self) -> Iterator[tuple[Symbol, str]]:
+        """Yield the goals as they are written: a class may stand for all of its members."""
+        left = {symbol: value for symbol, value in self.problem.goal.items() if symbol not in self.problem.weights}
+        for name, value in sorted({(symbol.situation, value) for symbol, value in left.items()}):
+            kind = self.situations[name]
+            symbols = {Symbol(name, (one,)) for one in self.problem.classes[kind.arguments[0]]}
+            alike = all(left.get(symbol) == value for symbol in symbols) and kind.arguments[0] in self.world.parents
+            if alike and len(kind.arguments) == 1 and kind.quantity is None and self.rng.random() < 0.8:
+                left = {symbol: of for symbol, of in left.items() if symbol not in symbols}
+                yield Symbol(name, kind.arguments), value
+        yield from left.items()
+        yield from ((symbol, self.problem.goal[symbol]) for symbol in self.problem.weights)

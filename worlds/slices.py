@@ -8,12 +8,41 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import dataclass
+from unittest.mock import patch
 
 from confab.reasoner.aggregates.dependencies import read_by
 from confab.reasoner.amounts import situations_in
+from confab.reasoner.graph.knowledge import KnowledgeGraph
 from confab.reasoner.language import situations_of, walk
+from confab.reasoner.reading import relevance
+from confab.reasoner.reading.problem import Reading
 from confab.reasoner.symbols import Problem
 from worlds.interpreter import Interpreter, State, TooManyStatesError
+
+
+@dataclass(frozen=True)
+class Slice:
+    """A comparison of the part of a scene that task recognition selects for `goals`, by few `queries`, with the whole scene.
+
+    `meant` is the interpreter of the whole scene. `states` and `most` are parameters of `difference`.
+    """
+
+    knowledge: KnowledgeGraph
+    goals: Sequence[str]
+    queries: int
+    meant: Interpreter
+    states: Sequence[State]
+    most: int
+
+    def part(self) -> Reading:
+        """Return the part of the scene that task recognition selects."""
+        with patch.object(relevance, "ROUNDS", self.queries):
+            return relevance.recognise(self.knowledge, self.goals)
+
+    def wrong(self, part: Reading) -> str:
+        """Return the difference between a part and the whole scene; an empty text if there is none."""
+        return "" if part.whole else difference(self.meant, Interpreter(part.problem), self.states, self.most)
 
 
 def difference(meant: Interpreter, part: Interpreter, states: Sequence[State], most: int) -> str:

@@ -47,6 +47,11 @@ def facts_of(
     facts = Parts(tuples, names, set(), set(), Definitions({}, {}, names))
     of_tuples: dict[str, tuple[str, tuple[str, ...]]] = {}
     for iri, node in tuples.items():
+        if facts.flag(iri, "negated"):
+            raise KnowledgeError(
+                f"<{iri}> is a fact with c:negated, but facts state what holds; remove the fact, or state c:value c:false",
+                iri,
+            )
         if CORE + "relation" in node:
             individuals = (*facts.arguments(iri), *(names.short(v) for v in facts.values(iri, "value")))
             relation, amount = names.short(facts.one(iri, "relation")), facts.decimal(iri, "amount")

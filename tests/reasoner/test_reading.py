@@ -116,6 +116,14 @@ def test_a_stated_fact_outside_of_the_class_of_its_situation_type_is_ignored(tmp
     assert read(load(path)).problem.initial == read(load("drawers-small")).problem.initial
 
 
+def test_a_fact_says_what_holds_and_may_not_be_negated(tmp_path: Path) -> None:
+    path = tmp_path / "mine.ttl"
+    said = ":closed a owl:NamedIndividual, c:SituatedObjectInstance ; c:about :drawer ; c:situationType d:OPENED ; c:negated true ."
+    path.write_text((SCENES / "drawers-small.ttl").read_text() + said)
+    with pytest.raises(KnowledgeError, match="closed> is a fact with c:negated"):
+        read(load(path))
+
+
 def test_a_conjunction_may_replace_a_single_condition(tmp_path: Path) -> None:
     domain = (SCENES.parent / "domains" / "drawers.ttl").read_text()
     together = "c:precondition :L2_TAKE.all ;"
