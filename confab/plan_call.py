@@ -276,7 +276,8 @@ def own_request(task: PlanningTask, problem: Problem, how: Searching, engines: b
 
         more = asks_for_times(problem, options.minimise) or (engines and some_installed(problem))
         seconds *= how.share * (OURS if more else 1.0)
-    shortening: Shortening = "brief" if how.brief else "once" if seconds is None else "repeated"
+    once = seconds is None or options.minimise == "makespan"
+    shortening: Shortening = "brief" if how.brief else "once" if once else "repeated"
     links = (
         memory
         if isinstance(memory, Links)

@@ -14,6 +14,7 @@ import networkx
 
 from confab.planner.plan import Plan, Reason, Step, renumbered
 from confab.planner.timed.activities import Activity, InapplicableError, StepEvent, activities, in_sequence
+from confab.planner.timed.bounds import of_any_plan
 from confab.planner.timed.exchange import choices_of, exchanged
 from confab.planner.timed.network import Begins, Network, network_of
 from confab.planner.timed.order import BEGIN, END, Order, TurnId, order_of
@@ -67,16 +68,6 @@ def best_in_time(
     separation : Fraction
         The minimum time between conflicting events, in seconds (epsilon in PDDL).
     """
-    found = _best(problem, plan, seconds, shorten, separation)
-    if found.plan is None or not shorten:
-        return found
-    from confab.planner.timed.bounds import of_any_plan
-
-    least = of_any_plan(problem)
-    return replace(found, plan=replace(found.plan, least=least, bound=max(found.plan.bound, least)))
-
-
-def _best(problem: Problem, plan: Plan, seconds: float | None, shorten: bool, separation: Fraction) -> Timed:
     from confab.planner.timed.sharing import evenly_shared, shared
 
     until = None if seconds is None else perf_counter() + seconds
@@ -85,24 +76,30 @@ def _best(problem: Problem, plan: Plan, seconds: float | None, shorten: bool, se
         return None if until is None else max(until - perf_counter(), 0.0) / parts
 
     def enough(one: Timed) -> bool:
-        return one.plan is not None and (not shorten or evenly_shared(problem, one.plan.work, one.plan.makespan))
+        timed = one.plan
+        return timed is not None and (
+            not shorten or timed.makespan <= bound or evenly_shared(problem, timed.work, timed.makespan)
+        )
 
     try:
-        first = in_time(problem, plan, left(4), separation)
+        found = in_time(problem, plan, left(4), separation)
     except LimitError as limit:
         return Timed(reason=Reason(str(limit)))
+    bound = Fraction(0)
     if shorten:
-        first = _spread(problem, plan, first, left(3), separation)
-    if enough(first):
-        return first
-    half = left(2)
-    other = shared(problem, plan, None if half is None else perf_counter() + half, shorten)
-    if other is None:
-        return first
-    found = first
-    with suppress(LimitError):
-        found = _better(first, in_time(problem, other, left(2), separation))
-    return _spread(problem, other, found, left(1), separation) if shorten else found
+        with suppress(LimitError):
+            bound = of_any_plan(problem)
+        found = _spread(problem, plan, found, left(3), separation)
+    if not enough(found):
+        end = until if until is None else (3 * until + perf_counter()) / 4
+        other = shared(problem, plan, end, shorten, bound)
+        if other is not None:
+            with suppress(LimitError):
+                found = _better(found, in_time(problem, other, left(2), separation))
+            found = _spread(problem, other, found, left(1), separation) if shorten else found
+    if found.plan is None or not shorten:
+        return found
+    return replace(found, plan=replace(found.plan, least=bound, bound=max(found.plan.bound, bound)))
 
 
 def _spread(problem: Problem, plan: Plan, known: Timed, seconds: float | None, separation: Fraction) -> Timed:

@@ -7,7 +7,8 @@ were achieved before still hold after a stretch.
 
 The first sequence of tasks follows the plan, or assigns each goal greedily to the crew that achieves the goal first. Then the
 search makes one change at a time, preferably to a task on the critical path. A change concerns the crew or the position of a task.
-The work is bounded. Therefore the result is the same on every machine, unless a time limit ends the search.
+Without a time limit, the work is bounded, and the result is the same on every machine. With a time limit, the search continues
+until the limit, unless the schedule reaches a lower bound or all actors are busy for the whole makespan.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from itertools import islice, product
+from math import inf
 from random import Random
 from time import perf_counter
 from typing import TypeAlias
@@ -110,7 +112,9 @@ class _Sequence:
     """
 
 
-def shared(problem: Problem, plan: Plan, until: float | None, shorten: bool = True) -> Plan | None:
+def shared(
+    problem: Problem, plan: Plan, until: float | None, shorten: bool = True, bound: Fraction = Fraction(0)
+) -> Plan | None:
     """Return a plan for the same goals in which several actors share the steps, for a short schedule.
 
     Return None if no such plan is found.
@@ -121,11 +125,14 @@ def shared(problem: Problem, plan: Plan, until: float | None, shorten: bool = Tr
     plan : Plan
         A plan of the problem, which determines the first order of the goals.
     until : float, optional
-        The end of the search, on the clock of `perf_counter`.
+        The end of the search, on the clock of `perf_counter`. Without it, the search ends after a number of changes that
+        depends only on the problem.
     shorten : bool
         Whether the search continues after it has found a schedule that keeps all time windows and deadlines.
+    bound : Fraction
+        A lower bound on the makespan in seconds; the search ends when a schedule reaches this bound.
     """
-    search = _SharingSearch(problem, plan, until, shorten)
+    search = _SharingSearch(problem, plan, until, shorten, bound)
     with suppress(LimitError):
         search.run()
     best = search.best
@@ -203,10 +210,11 @@ class _SharingSearch:
     plan: Plan
     until: float | None
     shorten: bool
+    bound: Fraction
     best: _Sequence | None = None
     stretches: dict[object, _Stretch | None] = field(default_factory=dict)
     work: int = 0
-    most: int = MOST_WORK
+    most: float = MOST_WORK
     known: dict[tuple[SharedTask, frozenset[Aim]], list[tuple[Step, ...]]] = field(default_factory=dict)
     """Known sequences of steps for each task after the same early steps; the planner tries these sequences before it searches."""
     failed: Counter[SharedTask] = field(default_factory=Counter)
@@ -255,18 +263,19 @@ class _SharingSearch:
         self.most, self.until = MOST_WORK // 2, None if until is None else (perf_counter() + until) / 2
         with suppress(LimitError):
             greedy = self.greedy()
-        self.most, self.until = MOST_WORK, until
+        self.most, self.until = MOST_WORK if until is None else inf, until
         if self.best is None or (greedy is not None and greedy.cost < self.best.cost):
             self.best = greedy
         now = self.best
         if now is None:
             return
         random, barren = Random(0), 0
-        while barren < (MOST_BARREN if now.cost[0] else min(BARREN * len(now.tasks), MOST_BARREN)) and now.critical:
+        while now.critical and (until is not None or barren < self.most_barren(now)):
             if not (self.shorten or now.cost[0]):
                 break
-            if not now.cost[0] and evenly_shared(self.problem, now.work, now.cost[1]):
+            if not now.cost[0] and (now.cost[1] <= self.bound or evenly_shared(self.problem, now.work, now.cost[1])):
                 break
+            self.spend(0)
             other = self.built(self.changed(now, random), now)
             barren += 1
             if other is None or other.cost > now.cost:
@@ -274,6 +283,10 @@ class _SharingSearch:
             if other.cost < now.cost:
                 barren = 0
             now = self.best = other
+
+    def most_barren(self, now: _Sequence) -> int:
+        """Return the maximum number of successive changes without a better schedule."""
+        return MOST_BARREN if now.cost[0] else min(BARREN * len(now.tasks), MOST_BARREN)
 
     def own(self) -> _Sequence | None:
         """Return the sequence of tasks that follows the plan.
