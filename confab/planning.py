@@ -164,6 +164,14 @@ def result_of(scene: Known, plan: Plan, goals: Facts = ()) -> Result:
     return Result(scene, problem, Outcome(Status.SOLVED, plan), dict(scene.seconds), goals=texts)
 
 
+class NoPlanError(KnowledgeError):
+    """Raised if a plan is needed and planning found none; `status` is the status of planning."""
+
+    def __init__(self, message: str, status: str = "") -> None:
+        super().__init__(message)
+        self.status = status
+
+
 AnyStep: TypeAlias = "int | str | tuple[int, ...] | tuple[str, ...] | Step"
 """The notations of a step of a plan; `Result.why` describes them."""
 
@@ -197,10 +205,10 @@ class Result(metaclass=RightNames):
 
     @property
     def plan(self) -> Plan:
-        """The plan. If there is no plan, a `KnowledgeError` with the reason is raised."""
+        """The plan. If there is no plan, a `NoPlanError` with the reason is raised."""
         if self.outcome.plan is None:
-            reason = self.outcome.reason.text if self.outcome.reason else ""
-            raise KnowledgeError(f"there is no plan ({self.outcome.status.value}): {reason}")
+            status, reason = self.outcome.status.value, self.outcome.reason
+            raise NoPlanError(f"there is no plan ({status}): {reason.text if reason else ''}", status)
         return self.outcome.plan
 
     @property
@@ -374,7 +382,7 @@ class Result(metaclass=RightNames):
             place = None if instead is None else find_step(self.plan, instead, labels)
             soft = {goal.fact: goal.weight for goal in self.soft_goals}
             try:
-                told = why_not(asked, self.problem, self.plan, labels, ask, replan, place, soft)
+                told = why_not(asked, self.problem, self.outcome.plan, labels, ask, replan, place, soft)
             except KnowledgeError:  # possibly only the whole scene has an individual of the text
                 if self.part is None:
                     raise

@@ -55,7 +55,7 @@ def run_to_end(call: Callable[[], int | None]) -> NoReturn:
     except click.ClickException as error:
         _end(MISUSE, _usage(error))
     except (KnowledgeError, DomainError) as error:
-        _end(MISUSE, by_options(str(error)))
+        _end(EXIT.get(getattr(error, "status", ""), MISUSE), by_options(str(error)))
     except LimitError as error:
         _end(GAVE_UP, by_options(str(error)))
     except MemoryError:

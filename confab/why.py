@@ -327,7 +327,7 @@ def _sentence(need: Need, steps: Steps, number: Mapping[Path, str], labels: Labe
 def why_not(
     asked: str,
     problem: Problem,
-    plan: Plan,
+    plan: Plan | None,
     labels: Labels,
     ask: Ask,
     replan: Replan,
@@ -344,7 +344,7 @@ def why_not(
         parameters, as in ``B2_PICK right_hand cup1``, or by name, as in ``B2_PICK hand=right_hand``. Sentences of explanations,
         such as ``pick cup 1 with right hand``, are also accepted.
     problem, plan
-        The problem and its plan.
+        The problem and its plan; without a plan, the alternative can only be a goal.
     labels : Labels
     ask, replan : callable
         Functions that plan: `ask` plans in a given problem, and `replan` plans in the scene for other goals.
@@ -364,6 +364,10 @@ def why_not(
         worded_behavior(problem, labels, asked) if behavior is None else (behavior, _given(problem, behavior, rest))
     )
     if worded is not None:
+        if plan is None:
+            raise KnowledgeError(
+                f"there is no plan with a step that '{asked}' could replace; wanted a goal: 'object SITUATION value'"
+            )
         try:
             found = instead_of(problem, plan, worded[0], dict(worded[1]), ask, instead)
         except NoChoiceError as error:
@@ -428,7 +432,7 @@ def _fact_told(
     fact: str,
     by: str | None,
     problem: Problem,
-    plan: Plan,
+    plan: Plan | None,
     labels: Labels,
     ask: Ask,
     replan: Replan,
@@ -445,21 +449,22 @@ def _fact_told(
         symbol, value = parse_fact(problem, fact)
     else:
         outcome = Outcome(Status.SOLVED, plan)
-        if problem.goal.get(symbol) != value:
+        if plan is None or problem.goal.get(symbol) != value:
             problem, outcome, labels = replan([*goals, fact])
     words = labels.fact(Fact(symbol, value))
     others = [labels.fact(goal) for goal in replaced if goal.value != value]
     weight = soft.get(Fact(symbol, value))
     kind = "goal" if weight is None else f"soft goal (weight {written(weight)})"
-    if by is None and problem.goal.get(symbol) == value and outcome.plan is plan:
+    if by is None and problem.goal.get(symbol) == value and outcome.plan is plan is not None:
         return WhyNot(asked, f"this is a {kind} already: {words}", more=0.0)
-    before = cost_of(problem, plan)
-    if by is not None:
+    before = 0.0 if plan is None else cost_of(problem, plan)
+    base = plan if outcome.plan is None else outcome.plan
+    if by is not None and base is not None:
         if not any(by in members for members in problem.classes.values()):
             known = problem.individuals
             raise KnowledgeError(f"unknown individual '{by}' in '{asked}'{nearest(by, known)}")
         try:
-            found = with_choice(problem, outcome.plan or plan, Symbol(symbol.situation, symbol.arguments), by, ask)
+            found = with_choice(problem, base, Symbol(symbol.situation, symbol.arguments), by, ask)
         except NoChoiceError as error:
             return WhyNot(asked, str(error))
         words += f", with {labels.name(by)} in every step that changes “{labels.about(symbol)}”"
@@ -475,13 +480,17 @@ def _fact_told(
     return _planned(asked, f"the {kind} that {words}", problem, plan, labels, found)
 
 
-def _planned(asked: str, what: str, problem: Problem, plan: Plan, labels: Labels, found: Contrast) -> WhyNot:
+def _planned(asked: str, what: str, problem: Problem, plan: Plan | None, labels: Labels, found: Contrast) -> WhyNot:
     assert found.plan is not None
     assert found.cost is not None
+    steps = tuple(f"{step.id} {labels.step(step)}" for step in found.plan.steps)
+    if plan is None:
+        return WhyNot(
+            asked, f"{what} is possible ({len(found.plan.primitives)} primitives):", (), found.plan, None, steps
+        )
     more = found.cost - found.before
     count = f"{len(found.plan.primitives)} primitives instead of {len(plan.primitives)}"
     said = f"costs {more:g} more" if more > 0 else "costs the same" if more == 0 else f"costs {-more:g} less"
-    steps = tuple(f"{step.id} {labels.step(step)}" for step in found.plan.steps)
     if breaks := _breaks(problem, plan, found.plan, labels):
         said = f"is possible, but the plan that was found violates a condition of a level above, and {said} ({count}):"
         return WhyNot(asked, f"{what} {said}", (), found.plan, more, steps, breaks)

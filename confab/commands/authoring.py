@@ -29,7 +29,7 @@ from confab.commands.options import (
 from confab.examples import examples
 from confab.progress import progress
 from confab.reasoner.kinds import CONVERTED, GENERATED, IMPORTED, PICTURE, PLAN, TRAJECTORIES
-from confab.terminal import EXIT, NO, YES, limited, remark, show_result, told
+from confab.terminal import NO, YES, limited, remark, show_result, told
 
 if TYPE_CHECKING:
     from confab.scene import Scene
@@ -307,8 +307,7 @@ def export(
 
 
 def _exported_trees(loaded: Scene, plan: Path | None, goal: tuple[str, ...], out: Path) -> tuple[Path, Path]:
-    """Write the behaviour tree of a given plan or of a new plan; exit if there is no plan."""
-    from confab.commands.given import plan_in
+    """Write the behaviour tree of a given plan or of a new plan."""
     from confab.trees import export_trees
 
     if goal:
@@ -317,7 +316,4 @@ def _exported_trees(loaded: Scene, plan: Path | None, goal: tuple[str, ...], out
         return export_trees(loaded.problem, plan_in(plan, loaded), out)
     with progress("planning"):
         result = loaded.plan()
-    if result.plan is None:
-        show_result(str(result))
-        raise Exit(EXIT[result.outcome.status.value])
     return export_trees(result.problem, result.plan, out)

@@ -494,8 +494,8 @@ def _explained(
     against: str | None,
     plot: Path | None,
 ) -> Any:
-    """Return the requested explanation of a result; if there is no plan, return the result."""
-    if not result.solved:
+    """Return the requested explanation of a result; without STEP or --not, and if there is no plan, return the result."""
+    if instead is None and which is None and not result.solved:
         return result
     if level not in result.problem.domain.levels:
         raise KnowledgeError(f"no level {level}; this scene has {', '.join(map(str, result.problem.domain.levels))}")
