@@ -22,6 +22,7 @@ from confab.planner.possibilities import (
     compared,
 )
 from confab.reasoner.amounts import MORE, bounds, terms_of, towards, written
+from confab.reasoner.language import terms, walk
 from confab.reasoner.sentences import an, said
 from confab.reasoner.symbols import (
     FALSE,
@@ -180,8 +181,7 @@ class _Causes:
 
     def holding(self, claims: Sequence[Claim]) -> Iterator[str]:
         """Yield as text which claims always hold, and which claims never hold."""
-        always = self.certificate.always
-        kept = [claim for claim in claims if always.get(claim.fact.symbol) == claim.fact.value]
+        kept = [*filter(self.kept, claims)]
         for facts, what in ((kept, "always"), ([claim for claim in claims if claim not in kept], "never")):
             if facts:
                 yield f"{_listed(facts)} {what} hold{'s' * (len(facts) == 1)}"
@@ -195,18 +195,23 @@ class _Causes:
         """Return the shortest chain of claims from the given claim to a claim whose cause depends on no other claim.
 
         If each cause depends on a claim, the chain ends at a claim about an amount with a cause that depends only on claims of the
-        chain (a drive needs charge), together with its other causes (charging needs the dock), or is the given claim alone.
+        chain (a drive needs charge), together with its other causes (charging needs the dock); otherwise at a claim with a cause
+        that depends only on facts that always hold, together with all such facts (every place is taken); otherwise, it is the given
+        claim alone.
         """
         queue: list[tuple[Claim, ...]] = [(goal,)]
         seen = {goal}
         first: tuple[tuple[Claim, ...], Cause] | None = None
         circle: tuple[tuple[Claim, ...], Cause] | None = None
+        stuck: tuple[tuple[Claim, ...], Cause] | None = None
         for chain in queue:  # the loop appends chains to the queue
             causes = self.causes(chain[-1], first=len(chain) == 1)
             for cause in causes:
                 if not cause.rests_on:
                     return list(chain), cause
                 first = first or ((goal,), cause)
+                if stuck is None and all(map(self.kept, cause.rests_on)):
+                    stuck = chain, cause
                 amount = self.lowest.quantity(chain[-1].fact.symbol.situation) is not None
                 if circle is None and amount and {*cause.rests_on} <= {*chain}:
                     every = [cause, *(other for other in causes if other is not cause)][:SHOWN]
@@ -216,8 +221,18 @@ class _Causes:
                     if claim not in seen:
                         seen.add(claim)
                         queue.append((*chain, claim))
+        if circle is None and stuck is not None:
+            chain, cause = stuck
+            held = [claim for claim in sorted(seen, key=str) if self.kept(claim) and claim not in chain]
+            because = f", because {' and '.join(self.holding(held))}" if len(held) > 1 else ""
+            words = [word for claim in held for word in _words(claim.fact)]
+            circle = chain, Cause(cause.text + because, (*cause.terms, *words))
         found, cause = circle or first or ((goal,), Cause("no behaviour has this effect"))
         return [*found], cause
+
+    def kept(self, claim: Claim) -> bool:
+        """Return whether a claim states that a fact always holds."""
+        return self.certificate.always.get(claim.fact.symbol) == claim.fact.value
 
     def causes(self, claim: Claim, first: bool) -> list[Cause]:
         """For each behaviour that could make a claim false, return the cause that prevents it, the simplest cause first.
@@ -238,7 +253,7 @@ class _Causes:
             cause = self.too_few(rule, given) or self.lacking(claim, rule.behavior, rule.conditions, given)
             found.append(cause)
         amount = lowest.quantity(situation) is not None
-        kept = not amount and self.certificate.always.get(symbol) == fact.value
+        kept = not amount and self.kept(claim)
         for behavior in lowest.behaviors:
             for effect in behavior.every_effect:
                 if effect.situation != situation:
@@ -271,7 +286,7 @@ class _Causes:
                 ]
                 found.append(self.lacking(claim, behavior, (*behavior.preconditions, *effect.when, *classes), bound))
         found = [cause for cause in found if cause.text]
-        if amount and not found and fact.value == self.certificate.always.get(symbol):
+        if amount and not found and self.kept(claim):
             return [Cause(f"{_named(symbol)} is always {fact.value}")]
         if amount and not found:
             return [Cause(f"no behaviour of level {lowest.level} gives {self.direction(fact)}")]
@@ -356,7 +371,8 @@ class _Causes:
             opened = [c for c in inner or core if not (isinstance(c, ClassCondition) and c.term == witness.variable)]
             opened = opened or core
         reading, view = self.reading()
-        any(True for _ in reading.solutions(tuple(opened), given, kinds))
+        inside = {c.term: c.kind for c in opened if isinstance(c, ClassCondition) and not c.negated and c.term in kinds}
+        any(True for _ in reading.solutions(with_classes(opened, given, kinds), given, {**kinds, **inside}))
         text = self.words(opened, given, kinds)
         names = tuple(
             word
@@ -365,7 +381,7 @@ class _Causes:
             if word
         )
         claims = [Claim(fact) for fact in view.claimed]
-        if claims == [claim] and self.certificate.always.get(claim.fact.symbol) != claim.fact.value:
+        if claims == [claim] and not self.kept(claim):
             return Cause(f"{behavior.name} requires that {claim} already holds", (behavior.name, *names), (claim,))
         (first, *more) = [substituted(condition, given) for condition in opened]
         if len(claims) > 1 and not more and isinstance(first, ValueCondition) and not first.negated:
@@ -387,7 +403,7 @@ class _Causes:
 
         def can(some: Sequence[Condition]) -> bool:
             reading, _ = self.reading()
-            return any(True for _ in reading.solutions(tuple(some), given, kinds))
+            return any(True for _ in reading.solutions(with_classes(some, given, kinds), given, kinds))
 
         if can(conditions):
             return None
@@ -404,8 +420,8 @@ class _Causes:
         reading, _ = self.reading()
         for env in reading.solutions(tuple(conditions), given, behavior.kinds):
             for effect in behavior.amounts:
-                for text, terms in self.beyond(reading, env, effect):
-                    return Cause(f"{behavior.name} would {text}", (behavior.name, *terms))
+                for text, words in self.beyond(reading, env, effect):
+                    return Cause(f"{behavior.name} would {text}", (behavior.name, *words))
         return Cause("")
 
     def beyond(
@@ -457,6 +473,16 @@ class _Causes:
         """Return a conjunction as text; variables without a value are written as their classes."""
         named = {**given, **{name: f"some {kind}" for name, kind in kinds.items() if name not in given}}
         return " and ".join(said(substituted(possible(substituted(c, given)), named)) for c in conditions)
+
+
+def with_classes(
+    conditions: Sequence[Condition], given: Mapping[str, str], kinds: Mapping[str, str]
+) -> tuple[Condition, ...]:
+    """Return conditions with the classes of the variables in quantifiers and alternatives, which bind only their own variables."""
+    nested = {
+        name for one in conditions if isinstance(one, AnyOf | Witness) for part in walk(one) for name in terms(part)
+    }
+    return (*conditions, *(ClassCondition(name, kinds[name]) for name in sorted(nested & kinds.keys() - given.keys())))
 
 
 def possible(condition: Condition) -> Condition:

@@ -8,7 +8,7 @@ from click.testing import CliRunner
 
 import confab
 import ontology
-from confab.cli import app
+from confab.cli import app, main
 from confab.labels import labels_of
 from confab.lifted import Sayings
 from confab.planner.plan import Plan
@@ -324,6 +324,37 @@ def test_an_alternative_in_a_plan_without_steps_replaces_nothing() -> None:
     result = confab.load("beverage-serving").plan().in_whole_scene()
     empty = replace(result, outcome=replace(result.outcome, plan=Plan(())))
     assert "no step that B1_MOVE could replace" in empty.why_not("B1_MOVE cup1 location8").answer
+
+
+def test_another_goal_is_planned_as_an_alternative_to_an_unsolvable_task() -> None:
+    scene = confab.load("two-cups").without_goal()
+    result = scene.plan(["cup1 LOCATION location7", "cup2 LOCATION location7"])
+    assert not result.solved
+    told = result.why_not("cup2 LOCATION location5")
+    assert told.answer.startswith(
+        "the goal that cup 2 is at location 5, in place of the goal that cup 2 is at location 7, is"
+    )
+    assert told.plan is not None
+    assert told.more is None
+    assert result.why_not("cup2 LOCATION location7").answer.startswith("no plan achieves that cup 2 is at location 7: ")
+    for ask in (lambda: result.why(0), result.verify):
+        with pytest.raises(
+            confab.KnowledgeError, match=r"there is no plan \(unsolvable\): cup1 LOCATION location7 and"
+        ):
+            ask()
+
+
+@pytest.mark.parametrize("call", ["plan", "verify", "explain", "explain 0", "export --bt -o tree"])
+def test_no_is_an_answer_of_every_command_that_needs_a_plan(
+    call: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    command, *more = call.split()
+    unsolvable = ["--goal", "cup1 LOCATION location7", "--goal", "cup2 LOCATION location7"]
+    with pytest.raises(SystemExit) as ended:
+        main([command, "two-cups", *more, *unsolvable])
+    assert ended.value.code == 1
+    assert "unsolvable" in "".join(capsys.readouterr())
 
 
 @pytest.mark.parametrize("asked", ["", " ", 3, None])

@@ -327,6 +327,17 @@ def test_a_behaviour_that_sets_another_value_is_no_achiever_of_the_goal() -> Non
             assert said == f"cup1 AT {wanted} can't be reached: no behaviour of level 1 has this effect"
 
 
+def test_the_reason_names_the_facts_that_hold_each_other_if_every_place_is_taken() -> None:
+    drop = behavior("DROP", 1, "?c:Cup ?p:Place", [PLACE_IS_FREE], [becomes("AT", "?c", "?p")])
+    free = kitchen({"AT cup1": "table"}, behaviors=[drop])
+    full = replace(free, classes={**free.classes, "Place": ("shelf", "table")})
+    assert why(free) == ""
+    assert why(full) == (
+        "cup1 AT table can't be reached: DROP requires no Cup AT table, which never holds, because cup1 AT shelf and "
+        "cup2 AT table always hold"
+    )
+
+
 def test_conditions_that_hold_singly_but_never_together_are_named_together() -> None:
     both = [has("CLEAN", "?x", TRUE), has("DRY", "?x", TRUE)]
     use = behavior("USE", 1, "?c:Cup ?x:Cup", both, [becomes("AT", "?c", "sink")])
