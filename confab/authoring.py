@@ -15,6 +15,7 @@ import pyoxigraph as ox
 from confab import ontology
 from confab.memory import Memory
 from confab.planner.paper.transitions import ground
+from confab.planner.plan import Status
 from confab.planner.solve import Mode
 from confab.reasoner.files import STDOUT, alone, made_folder, write_whole
 from confab.reasoner.graph.knowledge import KnowledgeError
@@ -153,7 +154,7 @@ def turtle_path(given: str | Path) -> Path:
 
 @dataclass(frozen=True)
 class Difference:
-    """The difference between two versions of a scene: the added and removed names by kind, and the lines of both plans."""
+    """The difference between two versions of a scene: the added and removed names, facts and goals, and the lines of both plans."""
 
     gained: dict[str, tuple[str, ...]]
     lost: dict[str, tuple[str, ...]]
@@ -175,7 +176,8 @@ class Difference:
             lines += [f"- {kind} {name}" for name in self.lost[kind]]
             lines += [f"+ {kind} {name}" for name in self.gained[kind]]
         if self.before == self.after:
-            return "\n".join([*lines, f"the plan is the same: {len(self.after)} steps"])
+            none = [line for line in self.after if line.startswith(tuple(f"{status.value}: " for status in Status))]
+            return "\n".join([*lines, *(none or [f"the plan is the same: {len(self.after)} steps"])])
         import difflib
 
         changes = difflib.unified_diff(self.before, self.after, "plan before", "plan after", lineterm="", n=1)
@@ -183,7 +185,7 @@ class Difference:
 
 
 def difference(old: Scene, new: Scene, mode: Mode) -> Difference:
-    """Return the difference between two versions of a scene in individuals, situation types, behaviours and the plan."""
+    """Return the difference between two versions of a scene in their names, facts, goals and plans."""
     before, after = _inventory(old), _inventory(new)
     return Difference(
         {kind: tuple(n for n in after[kind] if n not in set(before[kind])) for kind in after},
@@ -200,6 +202,8 @@ def _inventory(scene: Scene) -> dict[str, list[str]]:
         "individual": sorted(problem.individuals),
         "situation type": sorted(problem.domain.situations),
         "behaviour": list(problem.domain.behaviors),
+        "fact": scene.facts,
+        "goal": scene.goals,
         "quantified": [" ".join((g.behavior, *g.arguments)) for g in grounds],
     }
 
@@ -208,7 +212,8 @@ def _lines(scene: Scene, mode: Mode) -> tuple[str, ...]:
     """Return the plan of a scene, one line per step, or the reason why the scene has no plan."""
     result = scene.plan(mode=mode)
     if not result.solved:
-        return (f"no plan: {result.json().get('reason')}",)
+        reason = result.outcome.reason
+        return (f"{result.outcome.status.value}: {reason.text if reason else ''}",)
     return tuple(
         "  " * (len(step.path) - 1) + " ".join((step.behavior, *step.arguments)) + bindings_of(step)
         for step in result.plan.walk()

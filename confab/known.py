@@ -412,17 +412,22 @@ class Known(metaclass=RightNames):
         return Table(tuple(columns), rows, tuple(map(tuple, found)))
 
     def with_episodes(self: S, *files: str | Path) -> S:
-        """Add saved episodes to the scene for queries, and return the scene.
+        """Return a copy of the scene with saved episodes, for queries.
 
         Raises
         ------
         KnowledgeError
-            A file contains no episode, or two files contain episodes of the same name.
+            A file contains no episode, two files contain episodes of the same name, or the scene is at a SPARQL endpoint.
         """
+        if not files:
+            return self
         from confab.reasoner.memory.episodes import read_episodes
+        from confab.reasoner.reading.restating import copied
 
-        read_episodes(self.knowledge, map(Path, files))
-        return self
+        self.settle()
+        copy = copied(self.knowledge)
+        read_episodes(copy, map(Path, files))
+        return type(self)(copy, dict(self.seconds))
 
     def _asked(self, sparql: str, limits: QueryLimits | None) -> KnowledgeGraph:
         """Return the graph for a query, with the derived facts that the query names; warn once if imports are missing."""

@@ -127,7 +127,9 @@ def plan(
         if diff is not None:
             from confab.authoring import difference
 
-            changed = difference(load_scene(diff, changed=False), loaded, mode)
+            old = load_scene(diff, changed=False)
+            old, loaded = (one.with_goal(*goal) if goal else one for one in (old, loaded))
+            changed = difference(old, loaded, mode)
             show_result(changed.json() if as_json else str(changed))
             raise Exit(YES)
         remembered = memory_for(memory, no_memory, loaded)

@@ -49,7 +49,7 @@ def with_facts(graph: KnowledgeGraph, reading: Reading, facts: Sequence[Fact]) -
         refuse_impossible(reading.problem, initial, {**initial, **{fact.symbol: fact.value for fact in facts}})
     except ImpossibleStateError as error:
         raise KnowledgeError(f"{', '.join(map(str, facts))}: {error}") from error
-    copy = _copied(graph)
+    copy = copied(graph)
     properties = value_properties(graph)
     for fact in facts:
         symbol, iri = fact.symbol, reading.names.iri
@@ -66,7 +66,7 @@ def with_facts(graph: KnowledgeGraph, reading: Reading, facts: Sequence[Fact]) -
 
 def with_goals(graph: KnowledgeGraph, reading: Reading, goals: Sequence[Fact]) -> KnowledgeGraph:
     """Return a copy of a graph in which the given goals replace the goals for the same symbols."""
-    copy = _copied(graph)
+    copy = copied(graph)
     others = _unstate_goals(copy, reading, {goal.symbol for goal in goals})
     _state_goals(copy, reading, [*others, *goals])
     return copy
@@ -97,7 +97,7 @@ def without_goals(graph: KnowledgeGraph, reading: Reading, goals: Sequence[Fact]
     KnowledgeError
         Another goal of such a node isn't a fact, or has a weight.
     """
-    copy = _copied(graph)
+    copy = copied(graph)
     _state_goals(copy, reading, _unstate_goals(copy, reading, {goal.symbol for goal in goals}))
     return copy
 
@@ -124,7 +124,7 @@ def _unstate_goals(graph: KnowledgeGraph, reading: Reading, symbols: Collection[
 
 def with_refuted(graph: KnowledgeGraph, reading: Reading, refutations: Sequence[Refutation]) -> KnowledgeGraph:
     """Return a copy of a graph with additional refutations, stored in the graph of the scene's geometry."""
-    copy, target = _copied(graph), ox.NamedNode(BASE + "reach")
+    copy, target = copied(graph), ox.NamedNode(BASE + "reach")
     added = (triple for one in refutations for triple in refuted(graph, reading, one))
     copy.store.extend(ox.Quad(t.subject, t.predicate, t.object, target) for t in added)
     return copy
@@ -242,7 +242,8 @@ def _remove(
             graph.store.remove(quad)
 
 
-def _copied(graph: KnowledgeGraph) -> KnowledgeGraph:
+def copied(graph: KnowledgeGraph) -> KnowledgeGraph:
+    """Return a copy of a graph; raise `KnowledgeError` if the graph is at a SPARQL endpoint."""
     if graph.remote:
         raise KnowledgeError(f"{graph.scene}: a remote store is only read; change it with its own tools")
     store = ox.Store()

@@ -76,6 +76,22 @@ def test_the_difference_of_two_scenes_names_added_and_removed_parts(tmp_path: Pa
     assert str(same) == "the plan is the same: 2 steps"
 
 
+def test_the_difference_of_two_scenes_names_changed_facts_and_goals_and_the_reason_if_there_is_no_plan() -> None:
+    scene = confab.load("two-cups").without_goal()
+    one, other = (
+        scene.with_goal("cup1 LOCATION location5"),
+        scene.with_goal("cup1 LOCATION location7").with_fact("cup2 LOCATION location5"),
+    )
+    said = str(difference(one, other, "guarded"))
+    for line in ("- goal cup1 LOCATION location5", "+ goal cup1 LOCATION location7", "+ fact cup2 LOCATION location5"):
+        assert line in said
+    both = other.with_goal("cup2 LOCATION location7")
+    assert "\n+unsolvable: cup1 LOCATION location7 and cup2 LOCATION location7 exclude" in str(
+        difference(one, both, "guarded")
+    )
+    assert str(difference(both, both, "guarded")).startswith("unsolvable: cup1 LOCATION location7 and")
+
+
 def test_plans_that_differ_only_in_the_values_of_variables_are_different() -> None:
     scene = confab.load("beverage-serving")
     said = str(difference(scene, scene.with_fact("cup1 LOCATION location6"), "guarded"))

@@ -190,7 +190,8 @@ def test_several_saved_episodes_can_be_queried_together(tmp_path: Path) -> None:
     scene = confab.load("beverage-serving")
     scene.execute().save(tmp_path / "calm.ttl")
     scene.execute(interventions=FIGURE_8).save(tmp_path / "visit.ttl")
-    both = confab.load("beverage-serving").with_episodes(tmp_path / "calm.ttl", tmp_path / "visit.ttl")
+    both = scene.with_episodes(tmp_path / "calm.ttl", tmp_path / "visit.ttl")
+    assert not scene.query(ready("where-was-it"))
     rows = both.query(ready("where-was-it").replace("12.0", "12.5"))
     places = [row[4] for row in rows if row[1] == "cup2" and row[3] == "LOCATION"]
     assert places == ["location5", "location8"]
