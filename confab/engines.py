@@ -25,7 +25,7 @@ from confab.planner.levels import levels_left
 from confab.planner.plan import Outcome, Plan, Reason, Status
 from confab.planner.validation import validate
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.limits import Deadline, within
+from confab.reasoner.limits import Deadline, overtime, within
 from confab.reasoner.names import nearest
 from confab.reasoner.pddl.exporting import to_pddl
 from confab.reasoner.symbols import Problem, Symbol
@@ -115,7 +115,8 @@ def _planned(problem: Problem, engine: str | None, level: int | None, deadline: 
 
     found = read_pddl_plan(wanted, level, "".join(f"({line})\n" for line in lines), regroup=True, shorten=True)
     for plan in (under_the_levels_above(problem, found), found):
-        faults = validate(problem, plan)
+        with overtime():
+            faults = validate(problem, plan)
         if not faults:
             return outcome(Status.SOLVED, plan)
     return outcome(Status.GAVE_UP, reason=f"its plan is invalid: {faults[0].text}")

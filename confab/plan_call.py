@@ -26,9 +26,9 @@ from confab.known import Known
 from confab.plan_options import NO_ENGINE, PlanOptions
 from confab.planner.certified import certified
 from confab.planner.plan import Limits, Outcome, Reason, Shortening, Status
-from confab.planner.solve import DEFAULT_MODE, Request, solve
+from confab.planner.solve import DEFAULT_MODE, Request, solve, unchecked
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.limits import Deadline, LimitError
+from confab.reasoner.limits import Deadline, OutOfTimeError
 from confab.reasoner.memory.links import Links
 from confab.reasoner.reading.goals import with_goals
 from confab.reasoner.reading.problem import Reading
@@ -78,6 +78,8 @@ class PlanningTask:
     reading: Reading
     problem: Problem
     grounds: Mapping[int, tuple[GroundBehavior, ...]] | None
+    checking: float
+    """The expected time of the check in the whole scene, in seconds: the check reads the part of the scene again."""
 
     def whole(self) -> Problem:
         """Return the problem with all individuals of the scene."""
@@ -122,7 +124,7 @@ def read_task(
     scene: Known, goals: list[str], memory: Memory | Links | None, options: PlanOptions, deadline: Deadline
 ) -> PlanningTask:
     """Read the task of a planning call; the paper's mode and observed facts require the whole scene."""
-    grounds, paper = None, options.strategy == "paper"
+    grounds, paper, begin = None, options.strategy == "paper", perf_counter()
     if paper or options.observed is not None:
         reading = scene.reading
         if options.observed is not None:
@@ -138,7 +140,8 @@ def read_task(
 
         grounds = {level: quantify(scene.knowledge, reading, level) for level in reading.problem.domain.levels}
     scene.knowledge.confirm()
-    return PlanningTask(scene, goals, memory, options, deadline, reading, problem, grounds)
+    checking = 0.0 if reading.whole else perf_counter() - begin
+    return PlanningTask(scene, goals, memory, options, deadline, reading, problem, grounds, checking)
 
 
 def planned(task: PlanningTask) -> Found:
@@ -157,11 +160,16 @@ def planned(task: PlanningTask) -> Found:
         problem, outcome = searched_without(task, problem, faulty)
     else:
         problem, outcome = searched(task, problem)
-    if part is not None and needs_the_whole_scene(task, outcome):
-        whole = task.whole()
-        if whole != task.problem:
-            part = None
-            problem, outcome = searched(task, whole)
+    try:
+        if part is not None and needs_the_whole_scene(task, outcome):
+            whole = task.whole()
+            if whole != task.problem:
+                part = None
+                problem, outcome = searched(task, whole)
+    except OutOfTimeError as error:
+        if outcome.plan is None:
+            raise
+        outcome = unchecked(outcome, error)
     problem, timed = task.with_measured_durations(problem), None
     if outcome.status is Status.UNSOLVABLE and may_overlap_by_need(problem):
         outcome, timed = concurrent(problem, task.deadline)
@@ -175,7 +183,7 @@ def in_time(task: PlanningTask, problem: Problem, outcome: Outcome) -> tuple[Out
     shorten, left = task.options.minimise == "makespan", task.deadline.left
     half = task.deadline if left is None else Deadline.after(left / 2)
     found, timed = scheduled(problem, outcome, half, shorten)
-    if timed is None and outcome.plan is not None:
+    if timed is None and outcome.plan is not None and task.deadline.left != 0:
         mode = task.options.strategy
         other = search(task, problem, Searching(DEFAULT_MODE if mode == "optimal" else mode, brief=True))
         if other.plan is not None and other.plan.primitives != outcome.plan.primitives:
@@ -244,9 +252,9 @@ def searched(task: PlanningTask, problem: Problem) -> tuple[Problem, Outcome]:
 
 
 def search_in_time(task: PlanningTask, how: Searching, least: float, limit: str, problem: Problem) -> Outcome:
-    """Search; if fewer than `least` seconds are left, raise `LimitError` with the name of the limit."""
+    """Search; if fewer than `least` seconds are left, raise `OutOfTimeError` with the name of the limit."""
     if task.deadline.left is not None and task.deadline.left < least:
-        raise LimitError(limit)
+        raise OutOfTimeError(limit)
     return search(task, problem, how)
 
 
@@ -275,7 +283,7 @@ def own_request(task: PlanningTask, problem: Problem, how: Searching, engines: b
         from confab.engines import some_installed
 
         more = asks_for_times(problem, options.minimise) or (engines and some_installed(problem))
-        seconds *= how.share * (OURS if more else 1.0)
+        seconds = min(seconds * how.share * (OURS if more else 1.0), max(seconds - task.checking, seconds / 2))
     once = seconds is None or options.minimise == "makespan"
     shortening: Shortening = "brief" if how.brief else "once" if once else "repeated"
     links = (
@@ -310,7 +318,7 @@ def by_installed_engine(problem: Problem, deadline: Deadline, outcome: Outcome, 
     if tried:
         try:
             theirs = plan_by_engine(problem, None, None, deadline.left)
-        except KnowledgeError as error:
+        except (KnowledgeError, OutOfTimeError) as error:
             why = str(error)
         else:
             if theirs.status is Status.SOLVED:

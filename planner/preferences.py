@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
 from itertools import chain, islice
@@ -27,7 +26,7 @@ from confab.planner.plan import Forgone, Outcome, Status
 from confab.planner.plan_costs import cost_of
 from confab.planner.validation import unmet_goals
 from confab.reasoner.derivation import conditions_of_goal
-from confab.reasoner.limits import LimitError
+from confab.reasoner.limits import LimitError, OutOfTimeError, overtime
 from confab.reasoner.symbols import Fact, Problem, Symbol
 
 PlanSearch: TypeAlias = "Callable[[Problem], Outcome]"
@@ -73,7 +72,8 @@ class _SoftGoalChoices:
     """The outcomes of planning for choices of soft goals, and lower bounds on the costs of their plans.
 
     `away` are the soft goals with another value than the rest value of their symbol. If such a goal isn't chosen, its symbol
-    must be at rest in the end, so that a plan for fewer goals can cost more.
+    must be at rest in the end, so that a plan for fewer goals can cost more. `ended` and `proofs_ended` state whether the time for
+    searches and proofs is over; each further choice would end in the same way.
     """
 
     def __init__(self, problem: Problem, search: PlanSearch, prove: PlanSearch | None) -> None:
@@ -83,6 +83,7 @@ class _SoftGoalChoices:
         self.outcomes: dict[Goals, Outcome] = {}
         self.conflicts: list[tuple[frozenset[tuple[Symbol, str]], Outcome]] = []
         self.bounds: dict[Goals, Fraction | None] = {}
+        self.ended = self.proofs_ended = False
 
     def task(self, kept: Goals) -> Problem:
         """Return the task with the chosen soft goals as hard goals, and without the other soft goals."""
@@ -96,6 +97,8 @@ class _SoftGoalChoices:
         raises `LimitError` instead.
         """
         if kept not in self.outcomes:
+            if self.ended:
+                return Outcome(Status.GAVE_UP)
             task = self.task(kept)
             goals = task.goal_on(task.domain.levels[-1]).items()
             if (known := next((outcome for unmet, outcome in self.conflicts if unmet <= goals), None)) is not None:
@@ -104,9 +107,10 @@ class _SoftGoalChoices:
                 return Outcome(Status.GAVE_UP)
             try:
                 found = self.outcomes[kept] = self.search(task)
-            except LimitError:
+            except LimitError as error:
                 if not self.outcomes:
                     raise
+                self.ended = isinstance(error, OutOfTimeError)
                 return Outcome(Status.GAVE_UP)
             if found.certificate is not None and found.certificate.unmet:
                 unmet = frozenset((fact.symbol, fact.value) for fact in found.certificate.unmet)
@@ -132,8 +136,10 @@ class _SoftGoalChoices:
         if kept not in self.bounds:
             known = proved = self.outcome(kept)
             if self.prove is not None and known.status is not Status.UNSOLVABLE:
-                with suppress(LimitError):
+                try:
                     proved = self.prove(self.task(kept))
+                except LimitError as error:
+                    self.proofs_ended = isinstance(error, OutOfTimeError)
             none = proved.status is Status.UNSOLVABLE or proved.bound == inf
             self.bounds[kept] = None if none else Fraction(proved.bound or 0.0)
             self.outcomes[kept] = min((one for one in (proved, known) if one.plan), key=self.price, default=proved)
@@ -169,12 +175,13 @@ class _SoftGoalChoices:
 
     def settled(self, kept: Goals) -> Goals:
         """Return a choice that doesn't become cheaper by adding or dropping a single soft goal."""
-        found = None
+        found, total = None, self.total(kept)
         while found != kept:
             found = kept
             for symbol in reversed(self.by_weight()):
-                if self.cheaper(kept ^ {symbol}, kept):
-                    kept ^= {symbol}
+                other = None if self.ended else self.total(kept ^ {symbol})
+                if other is not None and (total is None or other < total):
+                    kept, total = kept ^ {symbol}, other
         return kept
 
     def cheapest(self, best: Goals) -> tuple[Goals, Fraction]:
@@ -188,7 +195,7 @@ class _SoftGoalChoices:
         for number, kept in enumerate(self.ascending()):
             bound, total = cheapest + self.unmet(kept), self.total(best)
             assert total is not None
-            if number == MOST_CHOICES or bound >= total:
+            if number == MOST_CHOICES or self.proofs_ended or bound >= total:
                 return best, min([bound, *bounds])
             own = self.least(kept)
             if own is not None:
@@ -222,7 +229,8 @@ class _SoftGoalChoices:
             more_work = finish(self.task(kept))
             outcome = min((one for one in (more_work, outcome) if one.plan), key=self.price)
         assert outcome.plan is not None
-        kept = Goals(self.weights.keys() - unmet_goals(self.problem, outcome.plan))
+        with overtime():
+            kept = Goals(self.weights.keys() - unmet_goals(self.problem, outcome.plan))
         cost, forgone = self.price(outcome), []
         for symbol in reversed(self.by_weight()):
             if symbol not in kept:

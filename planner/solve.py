@@ -26,7 +26,7 @@ from confab.planner.levels import levels_left
 from confab.planner.plan import OUT_OF_MEMORY, Limits, Outcome, Reason, Status, UnsolvableError
 from confab.planner.plan_costs import cost_of
 from confab.planner.validation import validate
-from confab.reasoner.limits import Deadline, OutOfTimeError, within
+from confab.reasoner.limits import Deadline, OutOfTimeError, overtime, within
 from confab.reasoner.symbols import GroundBehavior, Problem
 
 if TYPE_CHECKING:
@@ -96,7 +96,11 @@ def solve(request: Request) -> Outcome:
     if outcome.plan is None:
         with within(deadline):
             return certified(request.problem, outcome)
-    faults = validate(request.problem, outcome.plan)
+    try:
+        with within(deadline), overtime():
+            faults = validate(request.problem, outcome.plan)
+    except OutOfTimeError as error:
+        return unchecked(outcome, error)
     if faults:
         raise RejectedPlanError(
             f"mode {request.mode} returned steps that are no plan: {faults[0].text} (step {list(faults[0].path)}); "
@@ -109,6 +113,12 @@ def solve(request: Request) -> Outcome:
     if all(step.level == first for step in plan.steps):
         return outcome  # no run of lower-level steps to report
     return replace(outcome, left=tuple(levels_left(request.problem, plan)))
+
+
+def unchecked(outcome: Outcome, error: OutOfTimeError) -> Outcome:
+    """Return the outcome "gave up" in place of an outcome whose plan couldn't be checked in time."""
+    reason = Reason(f"a plan was found, but its check didn't end in time: {error}")
+    return replace(outcome, status=Status.GAVE_UP, plan=None, reason=reason, left=(), forgone=(), cost=None)
 
 
 def _with_experience(request: Request) -> Outcome:

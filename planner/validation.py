@@ -26,6 +26,7 @@ from confab.planner.checked_conditions import Arguments, Bindings, ConditionRead
 from confab.planner.checked_definitions import DefinedValues, Total, stratum_of
 from confab.planner.plan import Plan, Step
 from confab.reasoner.amounts import Quantity, meets
+from confab.reasoner.limits import check
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -158,6 +159,7 @@ class _PlanExecution:
         level = next((level for level in self.levels if level > above), above)
         marks = []
         for part in stretches(steps, level):
+            check("checking the plan")
             marks.append(len(self.facts.log))
             if part[0].level > level:
                 stretch = f"the stretch from {part[0]} to {part[-1]}"

@@ -85,21 +85,19 @@ def within(limit: Deadline | float | None) -> Iterator[Deadline]:
 
 
 @contextmanager
-def overtime(share: float = 0.1) -> Iterator[Deadline]:
+def overtime(share: float = 0.08) -> Iterator[Deadline]:
     """Extend the deadline by a share of the time limit (at least 0.1 s), so that a result that was found in time can be checked.
+
+    The deadline isn't extended further if it has already passed.
 
     Examples
     --------
     >>> with within(60.0), overtime() as deadline:
-    ...     deadline.left > 65.0
+    ...     deadline.left > 64.0
     True
     """
     now = _current.get()
-    later = (
-        now
-        if math.isinf(now.at)
-        else Deadline(max(now.at, perf_counter()) + max(share * now.seconds, 0.1), now.seconds)
-    )
+    later = now if math.isinf(now.at) else Deadline(now.at + max(share * now.seconds, 0.1), now.seconds)
     token = _current.set(later)
     try:
         yield later

@@ -45,7 +45,7 @@ from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, renumbered
 from confab.planner.timed.activities import InapplicableError, StepSimulation
 from confab.planner.validation import followed, open_goals
-from confab.reasoner.limits import LimitError, check
+from confab.reasoner.limits import LimitError, check, current
 from confab.reasoner.refutations import Refutation
 from confab.reasoner.symbols import FALSE, Fact, Problem, State, Symbol, Times
 
@@ -300,6 +300,8 @@ class _RunningEpisode:
         record, start, dispatch, paths = self.record, Fraction(self.world.seconds), left.dispatch, left.paths
 
         def may_begin(done: Set[int]) -> bool:
+            if current().left == 0:
+                return False
             now = Fraction(self.world.seconds) - start
             for late in dispatch.late(now) if dispatch.begun else ():  # other worlds have an order of their own
                 if late.certain:

@@ -64,7 +64,9 @@ def plan(
         return best
     lower, found = _proved(problem, best, limits, deadline)
     flat = () if found is None else (under_the_levels_above(problem, found, using), found)
-    plan = next((plan for plan in flat if not validate(problem, plan)), best.plan)
+    plan = best.plan
+    with suppress(LimitError):
+        plan = next((one for one in flat if not validate(problem, one)), plan)
     status = Status.SOLVED if plan is not None else best.status
     return replace(
         best,

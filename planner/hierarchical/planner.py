@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from time import perf_counter
 
@@ -31,7 +32,7 @@ from confab.planner.hierarchical.windows import as_refined, regroupings
 from confab.planner.plan import Limits, Outcome, Reason, Status, UnsolvableError, paused_collection
 from confab.planner.transitions import arguments_of
 from confab.planner.validation import validate
-from confab.reasoner.limits import LimitError, within
+from confab.reasoner.limits import LimitError, current, within
 from confab.reasoner.symbols import Problem, Symbol
 
 __all__ = ["ORDERS", "Call", "Compiled", "compiled", "plan"]
@@ -51,6 +52,9 @@ SEARCHING, SHORTENING = 0.93, 0.85
 
 The other time is for checking the plan, and for releasing memory.
 """
+
+CHECKS = 1.5
+"""Time that is kept for the checks of a plan, in units of the time of a check of the plan before it is shortened."""
 
 
 def alone(call: Call) -> None:
@@ -124,7 +128,7 @@ def _plan(
             if flat.plan is not None:
                 call.steps, call.bound, done = as_refined(call, flat.plan.steps), flat.bound, True
         if done or agenda.achieve_all():
-            call.space.most_work, call.space.deadline = math.inf, until
+            call.space.most_work, call.space.deadline = math.inf, before_the_check(call, until)
             plan = shortened(call, improve, leave_levels, advised) if improve else call.tree()
             if not leave_levels and any(step.level != levels[0] for step in plan.steps):
                 return given_up(
@@ -136,6 +140,17 @@ def _plan(
         return replace(call.outcome(Status.UNSOLVABLE, reason=proof.reason), certificate=proof.certificate)
     except LimitError as limit:
         return given_up(call, f"stopped at the limit: {limit}")
+
+
+def before_the_check(call: Call, until: float | None) -> float | None:
+    """Return the time until which a plan may be shortened: `until`, or earlier if the checks of the plan need more time."""
+    deadline = current()
+    if until is None or deadline.left is None:
+        return until
+    begin = perf_counter()
+    with suppress(LimitError):
+        validate(call.problem, call.tree())
+    return min(until, deadline.at - CHECKS * (perf_counter() - begin))
 
 
 def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool) -> Outcome:

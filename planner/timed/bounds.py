@@ -20,6 +20,7 @@ from confab.planner.plan import Reason, UngroundableError
 from confab.planner.timed.pieces import actors_of, default_actors, duration_of, pieces_of
 from confab.planner.validation import LoggedState
 from confab.reasoner.amounts import situations_in
+from confab.reasoner.limits import OutOfTimeError, current
 from confab.reasoner.symbols import Parameter, Problem, Span
 from confab.reasoner.timing import timing_of
 
@@ -45,8 +46,8 @@ def of_any_plan(problem: Problem) -> Fraction:
         return Fraction(0)
     wanted = {symbol: value for symbol, value in problem.goal_on(level).items() if problem.initial.get(symbol) != value}
     try:
-        task = ground(problem, level, goal=wanted, most=MOST_ROWS)
-    except (UngroundableError, MemoryError):
+        task = ground(problem, level, goal=wanted, most=MOST_ROWS, deadline=current().at)
+    except (UngroundableError, MemoryError, OutOfTimeError):
         return Fraction(0)
     if isinstance(task, Reason) or not len(task) or not task.goal:
         return Fraction(0)

@@ -29,7 +29,7 @@ from confab.planner.timed.schedules import (
 )
 from confab.planner.timed.validation import validate_timed
 from confab.planner.validation import Cell, validate
-from confab.reasoner.limits import LimitError
+from confab.reasoner.limits import LimitError, check, overtime
 from confab.reasoner.symbols import Fact, Problem, Times
 
 
@@ -170,7 +170,8 @@ def in_time(
             timed = timed_plan(problem, plan, order, network, choices, found)
             if timed is not None:
                 timed = replace(timed, bound=proved * network.unit, scheduler=scheduler, bounds=THESE_STEPS)
-                faults = validate_timed(problem, timed, separation)
+                with overtime():
+                    faults = validate_timed(problem, timed, separation)
                 if not faults:
                     return Timed(timed)
         if not choices.of and until:
@@ -278,6 +279,7 @@ def _slack(
     ]
     order = sorted(range(len(latest)), key=lambda i: -begins.begins[i])
     for _ in range(len(latest)):
+        check("scheduling the plan")
         changed = False
         for i in order:
             for j, apart in arcs[i]:

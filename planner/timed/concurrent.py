@@ -32,7 +32,7 @@ from confab.planner.timed.call import Timed, in_time
 from confab.planner.timed.pieces import duration_of
 from confab.planner.validation import LoggedState
 from confab.reasoner.language import walk
-from confab.reasoner.limits import OutOfTimeError, check
+from confab.reasoner.limits import OutOfTimeError, check, checked
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -257,13 +257,14 @@ class _Finder:
     """The bit of each symbol that an operator reads or sets."""
 
     def __post_init__(self) -> None:
-        self.named = [self.task.describe(operator)[:2] for operator in range(len(self.task))]
+        operators = range(len(self.task))
+        self.named = [self.task.describe(one)[:2] for one in checked(operators, "naming the operators")]
         self.end_of = {
             (name.partition("@")[0], arguments): operator
             for operator, (name, arguments) in enumerate(self.named)
             if name.endswith(END)
         }
-        seconds = [self._seconds(*one) for one in self.named]
+        seconds = [self._seconds(*one) for one in checked(self.named, "finding the durations of the operators")]
         self.unit = Fraction(1, lcm(self.separation.denominator, *(s.denominator for s in seconds)))
         self.lasts = [int(s / self.unit) for s in seconds]
         self.apart = int(self.separation / self.unit)

@@ -17,6 +17,7 @@ from confab.planner.timed.pieces import duration_of, pieces_of
 from confab.planner.timed.schedules import ActorChoices
 from confab.planner.validation import BehaviorReader, LoggedState
 from confab.reasoner.amounts import situations_in
+from confab.reasoner.limits import check
 from confab.reasoner.symbols import (
     ClassCondition,
     Comparison,
@@ -51,6 +52,7 @@ def choices_of(problem: Problem, plan: Plan, order: Order, network: Network) -> 
     lasts: dict[tuple[TurnId, int], dict[int, int]] = {}
     for actor, resource in actors.items():
         for number, turn in enumerate(order.resources[resource].turns):
+            check("scheduling the plan")
             if turn.reading or not whole(actor, turn.members):
                 continue
             able = [resource]

@@ -19,6 +19,7 @@ import networkx
 
 from confab.planner.timed.network import Network
 from confab.planner.timed.order import END, Edge, Order, TurnId
+from confab.reasoner.limits import check
 
 MOST_CREWS = 64
 """Maximum number of combinations of actors that are compared for a block."""
@@ -113,6 +114,7 @@ class Listing:
         heapq.heapify(queue)
         parked: dict[int, set[int]] = {}
         while queue:
+            check("scheduling the plan")
             _, _, number = heapq.heappop(queue)
             found = self.tried(blocks[number])
             if isinstance(found, set):

@@ -21,6 +21,7 @@ from itertools import pairwise
 
 from confab.planner.timed.activities import Activity, EventKind, InapplicableError, ReadAccess, StepEvent
 from confab.planner.validation import Cell
+from confab.reasoner.limits import check
 from confab.reasoner.symbols import Problem, Times
 
 BEGIN, END = 0, 1
@@ -126,6 +127,7 @@ def order_of(problem: Problem, activities: Sequence[Activity], events: Iterable[
     turn_of = [{m: t for t, turn in enumerate(r.turns) for m in turn.members} for r in resources]
     edges = dict[Edge, None]()
     for cell, found in records.items():
+        check("finding the order that the steps need")
         edges.update(dict.fromkeys(_chained(found, ends, activities, turn_of[own[cell]] if cell in own else None)))
     for key, groups in looked.items():
         edges.update(dict.fromkeys(_touching(groups, ends, turn_of[own[key]] if key in own else None)))

@@ -34,7 +34,7 @@ from confab.planner.timed.order import order_of
 from confab.planner.timed.pieces import default_actors
 from confab.planner.timed.schedules import turn_edges
 from confab.planner.validation import BehaviorReader, LoggedState, validate
-from confab.reasoner.limits import LimitError
+from confab.reasoner.limits import LimitError, check
 from confab.reasoner.symbols import AnyOf, Behavior, EqualityCondition, Problem, Symbol, ValueCondition
 from confab.reasoner.timing import timing_of
 
@@ -298,6 +298,7 @@ class _SharingSearch:
         goals = sorted(self.goals, key=lambda goal: self.last.get(goal, ends[-1] if ends else 0))
         stretches, state, at = list[_Stretch](), dict(self.problem.initial), 0
         for goal in goals:
+            check("sharing the goals among the actors")
             upto = next((k for k, end in enumerate(ends) if end >= self.last.get(goal, ends[-1])), len(ends) - 1) + 1
             upto = len(ends) if goal == goals[-1] else max(upto, at)
             steps = renumbered(self.plan.steps[at:upto])

@@ -16,6 +16,7 @@ from confab.planner.timed.activities import InapplicableError, activities, in_se
 from confab.planner.timed.exchange import exchanged, possible
 from confab.planner.timed.order import Order, order_of
 from confab.planner.validation import BehaviorReader, LoggedState, validate
+from confab.reasoner.limits import check
 from confab.reasoner.symbols import Problem
 
 
@@ -94,6 +95,7 @@ def _renamed(
     for value, its in spans.items():
         equal = [one for one in _equal(problem, value) if one in spans or one not in naming]
         for span in its:
+            check("scheduling the plan")
             taken[value].remove(span)
             upper = {step.path: step for number in span.naming for step in above[number]}.values()
             free = (

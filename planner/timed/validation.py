@@ -17,6 +17,7 @@ from confab.planner.timed.pieces import Pieces, actors_of, default_actors, durat
 from confab.planner.timed.plan import Slot, TimedPlan
 from confab.planner.validation import BehaviorReader, Cell, Fault, LoggedState, NewValue, validate
 from confab.reasoner.amounts import meets
+from confab.reasoner.limits import check
 from confab.reasoner.symbols import FALSE, Behavior, Problem, Times
 from confab.reasoner.timing import only_during
 
@@ -132,6 +133,7 @@ class _TimedExecution:
             + [(s.end, 1 if s.begin == s.end else 0, n, 1) for n, s in enumerate(slots)]
         )
         for time, _, number, which in events:
+            check("checking the plan in time")
             faults = list(self.ended(number, time) if which else self.begun(number, slots[number], time))
             yield from faults
             if faults:

@@ -14,6 +14,7 @@ from confab.reasoner.amounts import Amount, Quantity, inside, written
 from confab.reasoner.derivation import TASK, circles, needed
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.language import DomainError, walk
+from confab.reasoner.limits import checked
 from confab.reasoner.names import Names, local_name
 from confab.reasoner.reading import swrl
 from confab.reasoner.reading.definitions import Definitions
@@ -150,7 +151,10 @@ def names_of(schema: OntologySchema, members: Iterable[Member], namesakes: Itera
     """Return unique short names for a schema's terms, some individuals, and other IRIs with the same local names."""
     nodes = schema.nodes
     typed = (nodes[iri] for iri in schema.of_kind("Parameter", "Variable", *WITH_CLASS))
-    derived = {*derived_goals(schema), *(iri for iri in goals_of(nodes) if CORE + "weight" in nodes[iri])}
+    derived = {
+        *derived_goals(schema),
+        *(iri for iri in checked(goals_of(nodes), "reading the scene") if CORE + "weight" in nodes[iri]),
+    }
     return Names(
         {
             *schema.of_kind("SituationType", "Behavior", "Relation", "ReachRelation"),
@@ -158,7 +162,9 @@ def names_of(schema: OntologySchema, members: Iterable[Member], namesakes: Itera
             *derived,
             *iris_of_the_past(schema),
             *(task for task in schema.of_kind("Task") if derived.intersection(nodes[task].get(CORE + "goal", ()))),
-            *chain.from_iterable((individual, kind) for individual, kind, _ in members if individual not in nodes),
+            *chain.from_iterable(
+                (who, kind) for who, kind, _ in checked(members, "reading the scene") if who not in nodes
+            ),
             *chain.from_iterable((sub, *above) for sub, above in schema.supers.items()),
             *(kind for node in typed for name in ("termType", "ofClass") for kind in node.get(CORE + name, ())),
         },

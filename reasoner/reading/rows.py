@@ -284,10 +284,13 @@ def derived_goals(schema: OntologySchema) -> list[str]:
             for situation in node.get(CORE + "situationType", ())
         )
 
-    return sorted(iri for iri in goals_of(schema.nodes) if not fact(schema.nodes[iri]))
+    goals = checked(goals_of(schema.nodes), "reading the scene")
+    return sorted(iri for iri in goals if not fact(schema.nodes[iri]))
 
 
 def goals_of(nodes: Mapping[str, NodeValues]) -> list[str]:
     """Return the nodes that are goals of tasks."""
-    goals = dict.fromkeys(iri for node in nodes.values() for iri in node.get(CORE + "goal", ()))
+    goals = dict.fromkeys(
+        iri for node in checked(nodes.values(), "reading the scene") for iri in node.get(CORE + "goal", ())
+    )
     return [iri for iri in goals if iri in nodes]
