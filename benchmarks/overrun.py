@@ -33,6 +33,10 @@ SCENES = {
     "1,000 in each other's way": ("blocked", "--objects", "1000"),
 }
 """Generated scenes. In most of these scenes, planning takes more than five seconds."""
+BATCHES = {"200 batches": 200, "1,000 batches": 1_000}
+"""Scenes like the example bakery, whose plans have schedules, with this number of additional batches."""
+WEIGHED = {"200 weighed objects": 200, "1,000 weighed objects": 1_000}
+"""Scenes of the family `served` with this number of objects, whose goals have weights."""
 VALIDATED = ("1,000 objects", "10,000 objects")
 EASY, TABLE = "200 objects", "the paper's table"
 SERVED = (EASY, "1,000 objects", "10,000 objects")
@@ -75,6 +79,11 @@ COMMANDS: tuple[tuple[str, ...], ...] = (
     ("export", "SCENE", "--bt", "-o", "NEW"),
     ("export", "BODIES", "--trajectory", "-o", "NEW.json"),
     ("import", "domain.pddl", "problem.pddl", "-o", "NEW.ttl"),
+    ("plan", "TIMED"),
+    ("plan", "SERVED", "--minimise", "makespan"),
+    ("plan", "SOFT"),
+    ("execute", "TIMED"),
+    ("execute", "SOFT"),
 )
 """All commands with a time limit, each with the scene or the group of scenes in which it is tried.
 
@@ -99,6 +108,11 @@ CALLS: tuple[tuple[str, str], ...] = (
     ("SCENE", "scene.construct(ALL, NEW, limits=QueryLimits(seconds=S))"),
     ("LARGE", "within: confab.validate(scene.knowledge.path)"),
     ("LARGE", "within: scene.problem"),
+    ("TIMED", "scene.plan(time_limit=S)"),
+    ("SERVED", "scene.plan(time_limit=S, minimise='makespan')"),
+    ("SOFT", "scene.plan(time_limit=S)"),
+    ("TIMED", "scene.execute(time_limit=S)"),
+    ("TIMED", "scene.explain(time_limit=S)"),
 )
 """Calls in Python, each with its scene or group of scenes. `within` stands for a block of `confab.within(S)`."""
 BEGUN = """
@@ -185,6 +199,21 @@ def overrun(code: str, arguments: Sequence[str], seconds: float) -> Ended:
         return Ended(process.wait(), took)
 
 
+def bakery(batches: int) -> str:
+    """Return the example bakery with additional batches."""
+    text = Path(__file__).parents[1].joinpath("docs", "examples", "bakery", "bakery.ttl").read_text(encoding="utf-8")
+    its = [line for line in text.splitlines() if line.startswith((":rye a", ":morning.rye a"))]
+    named = [(f"batch{n}", line.replace("c:index 1", f"c:index {n + 4}")) for n in range(batches) for line in its]
+    goals = [f":morning c:goal :morning.batch{n} ." for n in range(batches)]
+    return "\n".join([text, *(line.replace("rye", name) for name, line in named), *goals])
+
+
+def weighed(file: str) -> None:
+    """Give all goals of a generated scene the same weight."""
+    text = Path(file).read_text(encoding="utf-8")
+    Path(file).write_text(text.replace("c:ValueCondition ;", "c:ValueCondition ; c:weight 30.0 ;"), encoding="utf-8")
+
+
 def waiting(process: int) -> float:
     """Return the seconds in which a process, perhaps an ended one, has waited for a processor."""
     return int((Path("/proc") / str(process) / "schedstat").read_text().split()[1]) / 1e9
@@ -202,10 +231,17 @@ def confab(*arguments: str) -> float:
 def main(limits: Sequence[float], chosen: Collection[int], files: Sequence[str]) -> None:
     """Print a row for each command and call, or for the rows of the given numbers, with the overrun at each limit."""
     with tempfile.TemporaryDirectory(prefix="confab-overrun-") as folder:
-        scenes = {Path(file).stem: file for file in files}
+        scenes, more = {Path(file).stem: file for file in files}, dict[str, str]()
         for number, (name, family) in enumerate({**SCENES, EASY: ("served", "--objects", "200")}.items()):
             scenes[name] = str(Path(folder, f"scene{number}.ttl"))
             confab("generate", *family, "-o", scenes[name])
+        for name, batches in BATCHES.items():
+            more[name] = str(Path(folder, f"{batches}-batches.ttl"))
+            Path(more[name]).write_text(bakery(batches), encoding="utf-8")
+        for name, objects in WEIGHED.items():
+            more[name] = str(Path(folder, f"{objects}-weighed.ttl"))
+            confab("generate", "served", "--objects", str(objects), "-o", more[name])
+            weighed(more[name])
         memory, plan = (str(Path(folder, name)) for name in ("memory.ttl", "plan.json"))
         taught = str(Path(folder, "taught.ttl"))
         confab("generate", "served", "--objects", "8", "-o", taught)
@@ -213,7 +249,7 @@ def main(limits: Sequence[float], chosen: Collection[int], files: Sequence[str])
         confab("plan", "beverage-serving", "-o", plan)
         confab("export", scenes["1,000 objects"], "-o", folder)
         hard, turn, new = [name for name in scenes if name != EASY], count(), count()
-        known = {**scenes, **SHIPPED, "MEMORY": memory, "PLAN.json": plan}
+        known = {**scenes, **more, **SHIPPED, "MEMORY": memory, "PLAN.json": plan}
         known |= {name: str(Path(folder, name)) for name in ("domain.pddl", "problem.pddl")}
 
         def tried(said: str, words: Sequence[str], name: str, seconds: float) -> Ended:
@@ -235,6 +271,7 @@ def main(limits: Sequence[float], chosen: Collection[int], files: Sequence[str])
                 continue
             groups = {"SCENE": hard[first % len(hard) :] + hard[: first % len(hard)]}
             groups |= {"SERVED": [*SERVED], "LARGE": [*LARGE], "BODIES": [*BODIES]}
+            groups |= {"TIMED": [*BATCHES], "SOFT": [*WEIGHED]}
             ended: dict[tuple[str, float], Ended] = {}
             for name in groups.get(where, [where])[:TRIED]:
                 ended[name, max(limits)] = tried(said, words, name, max(limits))

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 ENGINE_SECONDS = 60.0
 """Default time limit of a planning call by an engine in seconds."""
-IMPORTING = 1.0
+IMPORTING = 1.5
 """Seconds reserved for the import of unified-planning; if less time is left, no engine is started."""
 READING = 0.93
 """Share of the remaining time that an engine may use. In the rest of the time, the engine's plan is read and validated."""
@@ -185,13 +185,15 @@ def answer(domain: str, problem: str, engine: str | None, deadline: Deadline) ->
             + (f"pip install {KNOWN[engine]} brings it" if engine in KNOWN else "unified-planning lists its engines")
         )
     first = engine or next((name for name in factory.preference_list if name in factory.engines), None)
+    late = first or "unified-planning", "TIMEOUT", list[str]()
+    if deadline.left == 0:
+        return late
     if first and issubclass(factory.engine(first), PDDLPlanner) and ":numeric-fluents" not in domain:
         _tell(first, deadline)
         return first, *_directly(factory.engine(first)(), domain, problem, deadline)
     if "(:derived" in domain:
         said = f"{engine} takes no" if engine else "no installed engine takes"
         raise KnowledgeError(f"{said} derived predicates, which definitions become; plan without engine=")
-    late = first or "unified-planning", "TIMEOUT", list[str]()
     _tell(late[0], deadline)
     try:
         seconds = CPU_SECONDS if deadline.left is None else deadline.left

@@ -13,6 +13,7 @@ search        the engine that the caller names, or Confab's own search and then 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib.util import find_spec
@@ -183,8 +184,10 @@ def in_time(task: PlanningTask, problem: Problem, outcome: Outcome) -> tuple[Out
     shorten, left = task.options.minimise == "makespan", task.deadline.left
     half = task.deadline if left is None else Deadline.after(left / 2)
     found, timed = scheduled(problem, outcome, half, shorten)
-    if timed is None and outcome.plan is not None and task.deadline.left != 0:
-        mode = task.options.strategy
+    if timed is not None or outcome.plan is None:
+        return found, timed
+    mode = task.options.strategy
+    with suppress(OutOfTimeError):
         other = search(task, problem, Searching(DEFAULT_MODE if mode == "optimal" else mode, brief=True))
         if other.plan is not None and other.plan.primitives != outcome.plan.primitives:
             longer, timed = scheduled(problem, other, task.deadline, shorten)

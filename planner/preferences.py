@@ -135,7 +135,7 @@ class _SoftGoalChoices:
         """Return a proved lower bound on the cost of a plan for a choice, or None without a plan; store the cheapest plan."""
         if kept not in self.bounds:
             known = proved = self.outcome(kept)
-            if self.prove is not None and known.status is not Status.UNSOLVABLE:
+            if self.prove is not None and not self.proofs_ended and known.status is not Status.UNSOLVABLE:
                 try:
                     proved = self.prove(self.task(kept))
                 except LimitError as error:

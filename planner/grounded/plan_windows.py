@@ -22,6 +22,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
+from heapq import heappop, heappush
 from itertools import chain
 from time import perf_counter
 
@@ -170,18 +171,17 @@ def regrouped(task: Task, plan: Sequence[int]) -> list[int]:
     for followers in after:
         for f in followers:
             open_[f] += 1
-    ready = [i for i in range(n) if not open_[i]]
+    ready = [(1, i) for i in range(n) if not open_[i]]
     placed: dict[int, int] = {}
     order: list[int] = []
     while ready:
-        i = max(ready, key=lambda i: (max((placed[c] for c in causes[i]), default=-1), -i))
-        ready.remove(i)
+        _, i = heappop(ready)
         placed[i] = len(order)
         order.append(i)
         for f in after[i]:
             open_[f] -= 1
             if not open_[f]:
-                ready.append(f)
+                heappush(ready, (-max((placed[c] for c in causes[f]), default=-1), f))
     found = [plan[i] for i in order]
     return found if _leads(task, task.initial, found) else list(plan)
 

@@ -10,6 +10,7 @@ from confab.reasoner.amounts import Measure, written
 from confab.reasoner.condition_nodes import NodeValues
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.language import measured, walk
+from confab.reasoner.limits import checked
 from confab.reasoner.names import Names
 from confab.reasoner.possible import values_at_fault
 from confab.reasoner.reading.definitions import Definitions
@@ -17,6 +18,8 @@ from confab.reasoner.reading.goals import check_arguments
 from confab.reasoner.reading.parts import Parts
 from confab.reasoner.symbols import TRUE, Domain, RelationCondition, SituationType, State, Symbol
 from confab.reasoner.vocabulary import CORE
+
+READING = "reading the scene"
 
 
 def facts_of(
@@ -31,7 +34,7 @@ def facts_of(
     relations: dict[str, set[tuple[str, ...]]] = defaultdict(set)
     numbered: dict[str, set[tuple[str, ...]]] = defaultdict(set)  # relations whose rows end with a number
     stated: dict[Symbol, set[str]] = defaultdict(set)
-    for subject, predicate, value in rows:
+    for subject, predicate, value in checked(rows, READING):
         number = predicate in numbers
         pair = (names.short(subject), value if number else names.short(value))
         if predicate not in properties:
@@ -46,7 +49,7 @@ def facts_of(
             stated[Symbol(situation, pair[:1])].add(pair[1])
     facts = Parts(tuples, names, set(), set(), Definitions({}, {}, names))
     of_tuples: dict[str, tuple[str, tuple[str, ...]]] = {}
-    for iri, node in tuples.items():
+    for iri, node in checked(tuples.items(), READING):
         if facts.flag(iri, "negated"):
             raise KnowledgeError(
                 f"<{iri}> is a fact with c:negated, but facts state what holds; remove the fact, or state c:value c:false",
@@ -166,7 +169,8 @@ def initial_state(
     for situation in domain.situations.values():
         if situation.boolean or situation.name in domain.aggregates:
             continue
-        for arguments in product(*(classes.get(kind, ()) for kind in situation.arguments)):
+        every = product(*(classes.get(kind, ()) for kind in situation.arguments))
+        for arguments in checked(every, READING):
             symbol = Symbol(situation.name, arguments)
             if situation.quantity and len(arguments) > 1 and symbol not in stated and not situation.default:
                 continue  # e.g. a distance exists only if it is stated

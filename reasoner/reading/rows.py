@@ -246,13 +246,12 @@ def classes_of(
 
     of: dict[str, set[str]] = defaultdict(set)
     place: dict[str, int] = {}
-    for individual, kind, index in instances:
+    for individual, kind, index in checked(instances, "reading the scene"):
         of[individual] |= closure(kind)
         place[individual] = min(index, place.get(individual, index))
     members: dict[str, list[str]] = {kind: [] for kind in {*supers, *chain.from_iterable(supers.values())}}
-    for _, name, kinds in sorted(
-        (place[individual], names.short(individual), kinds) for individual, kinds in of.items()
-    ):
+    named = [(place[who], names.short(who), kinds) for who, kinds in checked(of.items(), "reading the scene")]
+    for _, name, kinds in sorted(named):
         for kind in kinds:
             members.setdefault(kind, []).append(name)
     classes = {name: tuple(members[kind]) for name, kind in sorted((names.short(kind), kind) for kind in members)}

@@ -22,6 +22,7 @@ from confab.planner.preferences import preferred
 from confab.planner.solve import Request, solve
 from confab.planner.validation import validate
 from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.limits import OutOfTimeError
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse
 from confab.reasoner.pddl.words import PddlError
@@ -54,6 +55,22 @@ def test_a_goal_that_costs_more_than_its_weight_is_left_unmet_and_reported_with_
     assert one.price is not None
     assert one.price > one.weight == 8
     assert not result.faults(result.plan)
+
+
+@pytest.mark.parametrize("proving", [False, True])
+def test_after_the_end_of_the_time_no_further_choice_is_searched(proving: bool) -> None:
+    searched = list[Problem]()
+
+    def search(problem: Problem) -> Outcome:
+        searched.append(problem)
+        if len(searched) > 2:
+            raise OutOfTimeError("the time limit")
+        return default(problem)
+
+    problem = confab.load("wishes-small").problem
+    _, outcome = preferred(problem, search, search if proving else None)
+    assert outcome.status is Status.SOLVED
+    assert len(searched) == (4 if proving else 3)
 
 
 def test_an_unmet_goal_with_alternatives_is_reported_with_its_conditions(tmp_path: Path) -> None:
