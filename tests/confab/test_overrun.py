@@ -1,12 +1,19 @@
 """`benchmarks.overrun` measures the overrun of every command and every call with a time limit."""
 
 import inspect
+from collections.abc import Callable
 from importlib import import_module
+from pathlib import Path
+from time import process_time
+
+import pytest
 
 import confab
-from benchmarks.overrun import CALLS, COMMANDS
+from benchmarks.overrun import CALLS, COMMANDS, bakery
 from confab import cli
+from confab.scene import Scene
 
+LIMIT, SLACK = 1.0, 1.5
 SERVERS = {"serve"}
 """Commands whose time limit applies to a single query (`benchmarks.load`)."""
 
@@ -33,3 +40,13 @@ def test_every_call_with_a_time_limit_is_measured() -> None:
     }
     assert {"plan", "execute", "query"} <= limited
     assert {name for name in limited - SERVERS if not any(f".{name}(" in call for _, call in CALLS)} == set()
+
+
+@pytest.mark.parametrize("call", [Scene.plan, Scene.execute, Scene.explain])
+def test_scheduling_and_executing_in_time_end_by_the_time_limit(call: Callable[..., object], tmp_path: Path) -> None:
+    file = tmp_path / "bakery.ttl"
+    file.write_text(bakery(600), encoding="utf-8")
+    scene = confab.load(file)
+    begin = process_time()
+    call(scene, time_limit=LIMIT)
+    assert process_time() - begin < LIMIT + SLACK

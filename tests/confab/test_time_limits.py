@@ -13,7 +13,6 @@ import pytest
 from click.testing import CliRunner
 
 import confab
-from benchmarks.overrun import bakery
 from confab.cli import COMMANDS, app
 from confab.commands.options import Seconds
 from confab.execution import Execution
@@ -111,16 +110,6 @@ def test_a_call_ends_by_the_limit_of_the_block_around_it(
         assert found.outcome.status is Status.GAVE_UP
     if isinstance(found, Execution):
         assert found.episode.status.value == "gave-up"
-
-
-@pytest.mark.parametrize("call", [Scene.plan, Scene.execute, Scene.explain])
-def test_scheduling_and_executing_in_time_end_by_the_time_limit(call: Callable[..., object], tmp_path: Path) -> None:
-    file = tmp_path / "bakery.ttl"
-    file.write_text(bakery(600), encoding="utf-8")
-    scene = confab.load(file)
-    begin = process_time()
-    call(scene, time_limit=1.0)
-    assert process_time() - begin < 1.0 + SLACK
 
 
 def test_a_lesson_beyond_its_time_limit_adds_nothing_to_the_memory(solved: Result) -> None:
