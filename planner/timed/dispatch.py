@@ -14,10 +14,12 @@ constraint networks", Journal of Experimental and Theoretical Artificial Intelli
 from __future__ import annotations
 
 import heapq
+from bisect import bisect_left
 from collections import defaultdict
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import partial
 from math import ceil, floor, inf
 
 from confab.planner.plan import Step
@@ -108,10 +110,14 @@ class Dispatch:
         return [i for i in self.waiting if self._possible(i, time, safe) <= time]
 
     def wakes(self, now: Fraction) -> Fraction | None:
-        """Return the next time at which a primitive can begin even if no primitive ends before that time, or None."""
+        """Return the next time at which the caller acts even if no primitive ends before that time, or None.
+
+        At this time, a primitive can begin, or it becomes certain that a goal misses its deadline.
+        """
         time = self._units(now)
         safe = self._safe(time)
         later = [at for i in self.waiting if time < (at := self._possible(i, time, safe)) < inf]
+        later += self._misses(time)
         return int(min(later)) * self.network.unit if later else None
 
     @property
@@ -153,6 +159,21 @@ class Dispatch:
         """
         lasts, begins = self._expected(self._units(now))
         return self._plan(CandidateSchedule(self.turns, begins), lasts)
+
+    def _misses(self, time: int) -> Iterator[int]:
+        """Yield the later times at which it becomes certain that a deadline is missed, if no primitive ends before."""
+        latest = {
+            key: floor(by / self.network.unit) for key, by in self.order.latest.items() if key[0] not in self.over
+        }
+
+        def certain(key: tuple[int, int], at: int) -> bool:
+            lasts, begins = self._expected(at, -self.spread)
+            return begins.begins[key[0]] + (lasts[key[0]] if key[1] == END else 0) > latest[key]
+
+        for key, by in latest.items():
+            times = range(time + 1, by + 2)
+            if times and not certain(key, time) and certain(key, times[-1]):
+                yield times[bisect_left(times, True, key=partial(certain, key))]
 
     # ------------------------------------------------------------------------------------------------------ conditions
 

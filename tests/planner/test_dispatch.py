@@ -8,7 +8,7 @@ from random import Random
 import pytest
 
 from confab.planner.hierarchical.planner import plan
-from confab.planner.plan import Limits, Plan
+from confab.planner.plan import Limits, Plan, Step
 from confab.planner.timed import concurrent
 from confab.planner.timed.call import in_time
 from confab.planner.timed.dispatch import Dispatch, DispatchRun, simulated
@@ -98,6 +98,15 @@ def test_a_missed_deadline_is_reported_as_soon_as_it_is_certain() -> None:
     assert late.goal == goal
     assert late.certain
     assert simulated(dispatch, lambda i, seconds: seconds).said == {goal: 0}
+
+
+def test_a_deadline_that_passes_while_a_step_is_executed_is_reported_at_the_deadline() -> None:
+    problem = problem_of(TimedWorld(1, (Action(5, None, (), (("end", (0, True)),)),), frozenset(), ((0, True),)))
+    problem = replace(problem, times=Times(deadlines=dict.fromkeys(problem.goal, Fraction(6))))
+    timed = in_time(problem, Plan((Step((0,), 0, 1, "A0", ()),))).plan
+    assert timed is not None
+    (known,) = simulated(Dispatch(problem, timed, SPREAD), lambda i, seconds: 2 * seconds).said.values()
+    assert 6 < known < 6.1
 
 
 @pytest.mark.parametrize(("spread", "late"), [(Fraction(0), True), (SPREAD, False)])
