@@ -59,7 +59,7 @@ The search does this maximum work in about twenty seconds.
 """
 CHOICE = 0.25
 """The share of the remaining time in which a plan for one choice of soft goals is searched."""
-CHOICE_WORK = 2_000_000
+CHOICE_WORK = 1_000_000
 """Maximum work of the search of a plan for one choice of soft goals, if there is no time limit."""
 
 
@@ -110,15 +110,17 @@ class Found(NamedTuple):
 
 
 class Searching(NamedTuple):
-    """The mode of a search, the share of the time limit that the search may use, and whether the plan is shortened only briefly.
+    """The mode of a search, the share of the time limit that the search may use, and the work for a shorter plan.
 
-    If `bounded` is true and there is no time limit, the work of the search is limited. A bounded search uses no engine.
+    By default, the work depends on the time limit. If `bounded` is true and there is no time limit, the work of the search is
+    limited. A bounded search uses no engine. `first` is an outcome whose plan is shortened instead of searching.
     """
 
     mode: str
     share: float = 1.0
-    brief: bool = False
+    shortening: Shortening | None = None
     bounded: bool = False
+    first: Outcome | None = None
 
 
 def read_task(
@@ -188,7 +190,7 @@ def in_time(task: PlanningTask, problem: Problem, outcome: Outcome) -> tuple[Out
         return found, timed
     mode = task.options.strategy
     with suppress(OutOfTimeError):
-        other = search(task, problem, Searching(DEFAULT_MODE if mode == "optimal" else mode, brief=True))
+        other = search(task, problem, Searching(DEFAULT_MODE if mode == "optimal" else mode, shortening="brief"))
         if other.plan is not None and other.plan.primitives != outcome.plan.primitives:
             longer, timed = scheduled(problem, other, task.deadline, shorten)
             found = found if timed is None else replace(longer, bound=outcome.bound)
@@ -233,21 +235,28 @@ def none_at_all(problem: Problem, deadline: Deadline) -> bool:
 def searched(task: PlanningTask, problem: Problem) -> tuple[Problem, Outcome]:
     """Search, and choose among soft goals; return the problem with the chosen goals, and the outcome."""
     mode = task.options.strategy
-    finish = partial(search, task, how=Searching(mode))
     if not problem.weights:
-        return problem, finish(problem)
+        return problem, search(task, problem, Searching(mode))
     from confab.planner.preferences import preferred
 
     alike = with_unit_costs(problem) if task.options.minimise == "steps" else problem
-    brief, seconds = Searching(DEFAULT_MODE if mode == "optimal" else mode, brief=True), task.deadline.left
-    bounded = brief._replace(share=CHOICE, bounded=True)
+    first, seconds = Searching(DEFAULT_MODE if mode == "optimal" else mode, shortening="none"), task.deadline.left
+    bounded = first._replace(share=CHOICE, bounded=True)
+
+    def comparing(choice: Problem) -> Searching:
+        return first if choice.goal.keys().isdisjoint(problem.weights) else bounded
 
     def choose(choice: Problem) -> Outcome:
-        how = brief if choice.goal.keys().isdisjoint(problem.weights) else bounded
-        return search_in_time(task, how, (seconds or 0.0) / 2, "half of the time limit, which is for proofs", choice)
+        limit = "half of the time limit, which is for proofs"
+        return search_in_time(task, comparing(choice), (seconds or 0.0) / 2, limit, choice)
+
+    def shorten(choice: Problem, found: Outcome, work: Shortening) -> Outcome:
+        how = Searching(mode) if work == "once" else comparing(choice)
+        return search(task, choice, how._replace(shortening=work, first=found))
 
     if seconds is None and mode != "optimal":
-        chosen, outcome = preferred(alike, choose, finish=finish)
+        fixed = task.options.by_engine or mode == "paper"
+        chosen, outcome = preferred(alike, choose, shorten=None if fixed else shorten)
     else:
         prove = partial(search_in_time, task, Searching(mode, share=0.5), (seconds or 0.0) / 10, "the time limit")
         chosen, outcome = preferred(alike, choose, prove)
@@ -288,7 +297,7 @@ def own_request(task: PlanningTask, problem: Problem, how: Searching, engines: b
         more = asks_for_times(problem, options.minimise) or (engines and some_installed(problem))
         seconds = min(seconds * how.share * (OURS if more else 1.0), max(seconds - task.checking, seconds / 2))
     once = seconds is None or options.minimise == "makespan"
-    shortening: Shortening = "brief" if how.brief else "once" if once else "repeated"
+    shortening = how.shortening or ("once" if once else "repeated")
     links = (
         memory
         if isinstance(memory, Links)
@@ -304,6 +313,7 @@ def own_request(task: PlanningTask, problem: Problem, how: Searching, engines: b
         links,
         task.grounds,
         options.leave_levels,
+        how.first,
     )
 
 

@@ -361,6 +361,7 @@ class Outcome:
     runs of consecutive lower-level steps in the plan, with the violated conditions of the level above. `saving` states how much
     cost the shortening saved per second in the end; it is None if the plan wasn't shortened. `certificate` proves that the task is
     unsolvable; every unsolvable outcome of `confab.planner.solve` has a certificate. `forgone` contains the unmet soft goals.
+    `effort` is the work of finding the plan, in units of about a microsecond.
     """
 
     status: Status
@@ -379,6 +380,7 @@ class Outcome:
     saving: float | None = None
     certificate: Certificate | None = None
     forgone: tuple[Forgone, ...] = ()
+    effort: int = 0
 
     @property
     def proved(self) -> bool:
@@ -393,7 +395,7 @@ class Outcome:
         return frozenset(one.fact.symbol for one in self.forgone)
 
 
-Shortening = Literal["brief", "once", "repeated"]
+Shortening = Literal["none", "brief", "once", "repeated"]
 """The work for a shorter plan: see `Limits`."""
 
 
@@ -404,9 +406,9 @@ class Limits:
     `seconds` limits the whole call, unless `seconds` is None. In the paper's mode, `expansions` limits each search. In the
     other modes, `expansions` limits the sum of all searches for single goals, and separately the final search for all goals
     together. `work` limits searches in grounded levels and parts of levels until a plan is found. The unit of `work` is states
-    times operators, about a microsecond each. `shortening` is the work for a shorter plan. With "once", there is one round.
-    With "brief", there is one round with little work, or no round if `seconds` is given. With "repeated", rounds follow one
-    another until the second half of them has saved nothing, or until `seconds` have passed.
+    times operators, about a microsecond each. `shortening` is the work for a shorter plan. With "none", there is no round;
+    with "once", there is one round. With "brief", there is one round with little work, or no round if `seconds` is given. With
+    "repeated", rounds follow one another until the second half of them has saved nothing, or until `seconds` have passed.
     """
 
     expansions: int = 200_000

@@ -5,24 +5,24 @@ a plan for the hard goals and the chosen soft goals, and the weights of the othe
 a small total cost.
 
 First, `preferred` plans for the hard goals alone. If there is no plan for the hard goals, the task has no plan, unless a soft goal
-replaces a rest value. Second, it plans for all soft goals together. The first choice contains all soft goals if there is such a
-plan, otherwise no soft goal if there is such a plan. Third, it adds or drops one soft goal at a time, the heaviest first, until no
-such change makes the choice cheaper. If `finish` is given, `preferred` then plans again for the chosen soft goals, with more work.
-If `prove` is given, it finally computes a lower bound for the choice and for all choices that could be cheaper. Choices with a
-smaller sum of unmet weights come first.
+replaces a rest value. Second, it plans for all soft goals together. From either choice, it adds or drops one soft goal at a time,
+the heaviest first, until no such change makes the choice cheaper. These plans only compare choices, so they needn't be shortened.
+If `shorten` is given, `preferred` then shortens the plans of the few cheapest choices with little work, and the plan of the best
+of them with the full work. If `prove` is given, it finally computes a lower bound for the choice and for all choices that could
+be cheaper. Choices with a smaller sum of unmet weights come first.
 """
 
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from itertools import chain, islice
 from math import inf
 from typing import TypeAlias
 
-from confab.planner.plan import Forgone, Outcome, Status
+from confab.planner.plan import Forgone, Outcome, Plan, Shortening, Status
 from confab.planner.plan_costs import cost_of
 from confab.planner.validation import unmet_goals
 from confab.reasoner.derivation import conditions_of_goal
@@ -30,15 +30,18 @@ from confab.reasoner.limits import LimitError, OutOfTimeError, overtime
 from confab.reasoner.symbols import Fact, Problem, Symbol
 
 PlanSearch: TypeAlias = "Callable[[Problem], Outcome]"
+Shortener: TypeAlias = "Callable[[Problem, Outcome, Shortening], Outcome]"
 Goals: TypeAlias = frozenset[Symbol]
 MOST_CHOICES = 200
 """Maximum number of choices for which a separate plan is searched in order to prove that no other choice is cheaper."""
+SHORTENED = 3
+"""Maximum number of choices that are compared by plans shortened with little work."""
 PRECISION = 1_000_000
 """Maximum denominator of the stated cost of meeting a soft goal; this cost is rounded, since costs are floating-point numbers."""
 
 
 def preferred(
-    problem: Problem, search: PlanSearch, prove: PlanSearch | None = None, finish: PlanSearch | None = None
+    problem: Problem, search: PlanSearch, prove: PlanSearch | None = None, shorten: Shortener | None = None
 ) -> tuple[Problem, Outcome]:
     """Choose among the soft goals of a task; return the task without the unmet soft goals, and the outcome of planning for it.
 
@@ -46,11 +49,13 @@ def preferred(
     ----------
     problem : Problem
         A problem whose soft goals have weights.
-    search, prove, finish : callable
+    search, prove : callable
         Functions that plan for the goals of a problem. `prove` also proves a lower bound on the cost; with `prove`, all choices are
         tried that could be cheaper, at most `MOST_CHOICES`, and `bound` of the outcome is a lower bound on the total cost of any
         choice, reduced by the weights of the unmet soft goals. It is negative if a choice with a smaller total cost than these
-        weights isn't excluded. With `finish`, which does more work than `search`, `search` only compares the choices.
+        weights isn't excluded.
+    shorten : callable, optional
+        Function that shortens the plan of an outcome of `search`.
     """
     if not problem.weights:
         return problem, (prove or search)(problem)
@@ -62,18 +67,25 @@ def preferred(
         found = choices.outcome(nothing)
         certified = not choices.away or choices.excluded()
         return choices.task(nothing), found if certified else replace(found, status=Status.GAVE_UP, certificate=None)
-    best = choices.settled(first if choices.total(everything) is None else everything)
-    if prove is None:
-        return choices.result(best, finish=finish)
-    return choices.result(*choices.cheapest(best))
+    for start in (everything, first):
+        if choices.total(start) is not None:
+            choices.settle(start)
+    best, *others = choices.compared()
+    if prove is not None:
+        return choices.result(*choices.cheapest(best))
+    if shorten is None:
+        return choices.result(best)
+    best = choices.shortened([best, *others[: SHORTENED - 1]], shorten)
+    return choices.result(best, outcome=shorten(choices.task(best), choices.briefly[best], "once"))
 
 
 class _SoftGoalChoices:
     """The outcomes of planning for choices of soft goals, and lower bounds on the costs of their plans.
 
-    `away` are the soft goals with another value than the rest value of their symbol. If such a goal isn't chosen, its symbol
-    must be at rest in the end, so that a plan for fewer goals can cost more. `ended` and `proofs_ended` state whether the time for
-    searches and proofs is over; each further choice would end in the same way.
+    `briefly` are the outcomes with shortened plans. `away` are the soft goals with another value than the rest value of their
+    symbol. If such a goal isn't chosen, its symbol must be at rest in the end, so that a plan for fewer goals can cost more.
+    `ended` and `proofs_ended` state whether the time for searches and proofs is over; each further choice would end in the same
+    way.
     """
 
     def __init__(self, problem: Problem, search: PlanSearch, prove: PlanSearch | None) -> None:
@@ -81,8 +93,10 @@ class _SoftGoalChoices:
         rests = {symbol: problem.domain.situations[symbol.situation].rest for symbol in problem.weights}
         self.away = Goals(symbol for symbol, rest in rests.items() if rest not in (None, problem.goal[symbol]))
         self.outcomes: dict[Goals, Outcome] = {}
+        self.briefly: dict[Goals, Outcome] = {}
         self.conflicts: list[tuple[frozenset[tuple[Symbol, str]], Outcome]] = []
         self.bounds: dict[Goals, Fraction | None] = {}
+        self.prices: dict[int, tuple[Plan, Fraction]] = {}
         self.ended = self.proofs_ended = False
 
     def task(self, kept: Goals) -> Problem:
@@ -112,6 +126,10 @@ class _SoftGoalChoices:
                     raise
                 self.ended = isinstance(error, OutOfTimeError)
                 return Outcome(Status.GAVE_UP)
+            if found.plan is not None:
+                with overtime():
+                    met = Goals(self.weights.keys() - unmet_goals(self.problem, found.plan))
+                self.outcomes.setdefault(met, found)  # no search for goals that the plan meets without additional cost
             if found.certificate is not None and found.certificate.unmet:
                 unmet = frozenset((fact.symbol, fact.value) for fact in found.certificate.unmet)
                 self.conflicts.append((unmet, found))
@@ -152,8 +170,11 @@ class _SoftGoalChoices:
 
     def price(self, found: Outcome) -> Fraction:
         """Return the cost of the plan of an outcome."""
-        assert found.plan is not None
-        return Fraction(cost_of(self.problem, found.plan))
+        plan = found.plan
+        assert plan is not None
+        if id(plan) not in self.prices:
+            self.prices[id(plan)] = plan, Fraction(cost_of(self.problem, plan))
+        return self.prices[id(plan)][1]
 
     def total(self, kept: Goals) -> Fraction | None:
         """Return the total cost of a choice: the cost of its plan plus the unmet weights, or None if no plan was found."""
@@ -173,8 +194,8 @@ class _SoftGoalChoices:
         """Return the soft goals sorted by weight, the smallest weight first."""
         return sorted(self.weights, key=lambda symbol: (self.weights[symbol], symbol))
 
-    def settled(self, kept: Goals) -> Goals:
-        """Return a choice that doesn't become cheaper by adding or dropping a single soft goal."""
+    def settle(self, kept: Goals) -> None:
+        """Plan for the choices that add or drop a single soft goal, and move on while such a choice is cheaper."""
         found, total = None, self.total(kept)
         while found != kept:
             found = kept
@@ -182,7 +203,22 @@ class _SoftGoalChoices:
                 other = None if self.ended else self.total(kept ^ {symbol})
                 if other is not None and (total is None or other < total):
                     kept, total = kept ^ {symbol}, other
-        return kept
+
+    def compared(self) -> list[Goals]:
+        """Return the choices with different plans, sorted by their total costs."""
+        totals = {kept: total for kept in self.outcomes if (total := self.total(kept)) is not None}
+        best = dict[int, Goals]()
+        for kept in sorted(totals, key=totals.__getitem__):
+            best.setdefault(id(self.outcomes[kept]), kept)
+        return list(best.values())
+
+    def shortened(self, some: Sequence[Goals], shorten: Shortener) -> Goals:
+        """Shorten the plans of several choices with little work, and return the cheapest of these choices."""
+        if len(some) == 1:
+            self.briefly = dict.fromkeys(some, self.outcome(some[0]))
+            return some[0]
+        self.briefly = {kept: shorten(self.task(kept), self.outcome(kept), "brief") for kept in some}
+        return min(some, key=lambda kept: self.price(self.briefly[kept]) + self.unmet(kept))
 
     def cheapest(self, best: Goals) -> tuple[Goals, Fraction]:
         """Return the cheapest choice found, at least as cheap as `best`, and a lower bound on the total cost of any choice.
@@ -216,28 +252,29 @@ class _SoftGoalChoices:
                 heapq.heappush(waiting, (unmet + self.weights[order[i]], (*dropped, i)))
 
     def result(
-        self, kept: Goals, least: Fraction | None = None, finish: PlanSearch | None = None
+        self, chosen: Goals, least: Fraction | None = None, outcome: Outcome | None = None
     ) -> tuple[Problem, Outcome]:
         """Return the task of a choice, and the outcome with the unmet soft goals and the additional cost of meeting each goal.
 
-        `least` is a lower bound on the total cost of any choice. `finish` plans for the task of the choice. The additional costs
-        are differences between plans of `search`.
+        `least` is a lower bound on the total cost of any choice. `outcome` is the final outcome, by default that of `search`.
         """
-        outcome, chosen = self.outcome(kept), kept
-        compared = self.price(outcome)
-        if finish is not None:
-            more_work = finish(self.task(kept))
-            outcome = min((one for one in (more_work, outcome) if one.plan), key=self.price)
+        outcome = outcome or self.outcome(chosen)
         assert outcome.plan is not None
         with overtime():
             kept = Goals(self.weights.keys() - unmet_goals(self.problem, outcome.plan))
         cost, forgone = self.price(outcome), []
         for symbol in reversed(self.by_weight()):
             if symbol not in kept:
-                other = self.cost(chosen | {symbol})
                 fact = Fact(symbol, self.problem.goal[symbol])
-                more = None if other is None else (other - compared).limit_denominator(PRECISION)
                 wanted = conditions_of_goal(self.problem.domain, symbol)
-                forgone.append(Forgone(fact, self.weights[symbol], more, wanted))
+                forgone.append(Forgone(fact, self.weights[symbol], self.more(chosen, symbol), wanted))
         bound = None if least is None else float(min(least - self.unmet(kept), cost))
         return self.task(kept), replace(outcome, forgone=tuple(forgone), bound=bound)
+
+    def more(self, chosen: Goals, symbol: Symbol) -> Fraction | None:
+        """Return the additional cost of meeting an unmet soft goal, as the difference of plans for which the same work was done."""
+        other = chosen | {symbol}
+        if self.cost(other) is None:
+            return None
+        found = self.briefly if other in self.briefly else self.outcomes
+        return (self.price(found[other]) - self.price(found[chosen])).limit_denominator(PRECISION)

@@ -60,6 +60,8 @@ class Request:
         The quantified behaviours for the paper's mode; by default the arguments are computed from the problem's classes.
     leave_levels : bool
         Whether steps of a lower level may replace steps of a level that has no plan with refinements.
+    first : Outcome, optional
+        The outcome of an earlier request for the same problem; the modes guarded, leading and strict shorten its plan.
     """
 
     problem: Problem
@@ -69,6 +71,7 @@ class Request:
     links: Links | None = None
     grounds: Mapping[int, tuple[GroundBehavior, ...]] | None = None
     leave_levels: bool = True
+    first: Outcome | None = None
 
 
 def solve(request: Request) -> Outcome:
@@ -125,10 +128,17 @@ def _with_experience(request: Request) -> Outcome:
     if request.memory is None:
         from confab.planner.hierarchical.planner import plan as without
 
-        return without(request.problem, limits=request.limits, leave_levels=request.leave_levels)
+        return without(request.problem, limits=request.limits, leave_levels=request.leave_levels, first=request.first)
     from confab.planner.experience.advice import plan
 
-    return plan(request.problem, request.memory, request.mode, request.limits, leave_levels=request.leave_levels)
+    return plan(
+        request.problem,
+        request.memory,
+        request.mode,
+        request.limits,
+        leave_levels=request.leave_levels,
+        first=request.first,
+    )
 
 
 def _optimal(request: Request) -> Outcome:

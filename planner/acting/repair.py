@@ -18,12 +18,11 @@ from difflib import SequenceMatcher
 
 from confab.planner.certified import certified
 from confab.planner.hierarchical.agenda import Agenda, order
-from confab.planner.hierarchical.call import Call, Compiled, bring_to_rest, compiled
+from confab.planner.hierarchical.call import Call, Compiled, as_refined, bring_to_rest, compiled
 from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.hierarchical.refinement import RefinedStep
 from confab.planner.hierarchical.search_budget import ONE_STEP
 from confab.planner.hierarchical.unsolvability import impossible
-from confab.planner.hierarchical.windows import as_refined
 from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, UnsolvableError, renumbered
 from confab.planner.plan_costs import cost_of, costs_of_steps
 from confab.planner.transitions import Cell, arguments_of, key_of

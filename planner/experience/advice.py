@@ -150,6 +150,7 @@ def plan(
     using: Compiled | None = None,
     improve: int = fast.ORDERS,
     leave_levels: bool = True,
+    first: Outcome | None = None,
 ) -> Outcome:
     """Plan with experience, which has influence according to `mode`: ``strict``, ``guarded`` or ``leading``.
 
@@ -157,7 +158,7 @@ def plan(
     rules have tried.
     """
     if memory is None or not memory.leads(problem, mode):
-        return fast.plan(problem, limits=limits, improve=improve, using=using, leave_levels=leave_levels)
+        return fast.plan(problem, limits=limits, improve=improve, using=using, leave_levels=leave_levels, first=first)
     joins: dict[str, Bind | None] = {}
 
     def advised(call: Call) -> None:
@@ -166,5 +167,5 @@ def plan(
     with paused_collection():
         warm = memory.warmed(using or fast.compiled(problem))
         return fast.plan(
-            problem, limits=limits, improve=improve, using=warm, leave_levels=leave_levels, advised=advised
+            problem, limits=limits, improve=improve, using=warm, leave_levels=leave_levels, advised=advised, first=first
         )

@@ -13,7 +13,7 @@ as the step is found.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from confab.planner.hierarchical.call import Call, bring_to_rest
@@ -31,6 +31,7 @@ from confab.planner.hierarchical.search_budget import (
 )
 from confab.planner.hierarchical.unsolvability import Proofs
 from confab.planner.transitions import Cell, arguments_of
+from confab.reasoner.limits import LimitError
 from confab.reasoner.symbols import Condition
 
 
@@ -49,12 +50,16 @@ class Agenda:
     trial : bool
         Whether applied steps are final, and a failure proves nothing. Otherwise, the agenda may restart from the initial state, and
         attempts to prove that there is no plan.
+    below : function, optional
+        Function that replaces all steps by the steps of a brief search of the lowest level as a whole; it returns whether all goals
+        hold.
     """
 
     call: Call
     levels: tuple[int, ...] | None = None
     quickly: bool = False
     trial: bool = False
+    below: Callable[[], bool] | None = None
     _open: deque[Cell] = field(default_factory=deque)
     _asleep: dict[Cell, None] = field(default_factory=dict)
     _waiting: dict[Cell, list[Cell]] = field(default_factory=dict)
@@ -256,13 +261,31 @@ class Agenda:
         call.steps, call.given_up = [], []
         call.kept = {cell: value for cell, value in call.goal.items() if call.met(cell)}
         refiner.careful = True
-        if self.all_goals(level):
+        if self.all_goals_or_below(level):
             self.begin()
             return True
         refiner.careful = False
         call.replace_steps(steps)
         call.steps, call.given_up, call.kept = steps, given_up, kept
         return False
+
+    def all_goals_or_below(self, level: int) -> bool:
+        """Achieve all goals together; when this has doubled the effort of the call, first search the lowest level briefly."""
+        call, space = self.call, self.call.space
+        most = space.most_work
+        if self.below is None:
+            return self.all_goals(level)
+        space.most_work = min(most, space.worked + space.effort)
+        try:
+            return self.all_goals(level)
+        except LimitError:
+            if not space.most_work < space.worked <= most:
+                raise
+        finally:
+            space.most_work = most
+        call.replace_steps(())
+        del self._tried[level]
+        return self.below() or self.all_goals(level)
 
     def all_goals(self, level: int) -> bool:
         """Achieve all goals together on a level from the current state; return whether that succeeded.

@@ -100,6 +100,19 @@ class Call:
         for step in steps:
             self.refiner.replay_checked(step)
 
+    def resume(self, found: Outcome) -> bool:
+        """Apply the steps of the plan of another outcome; return whether all steps are applicable and have their refinements."""
+        assert found.plan is not None
+        steps = [self.refiner.replay_checked(step) for step in as_refined(self, found.plan.steps)]
+        applied = [step for step in steps if step is not None]
+        if len(applied) < len(steps) or not all(map(self.met, self.goal)):
+            self.table.undo(0)
+            return False
+        self.steps, self.given_up, self.kept = applied, list(found.given_up), dict(self.goal)
+        self.space.worked = found.effort
+        self.count(found)
+        return True
+
     def achieve_goal(self, level: int, cell: Cell, *budgets: SearchBudget) -> bool:
         """Achieve one goal by refined steps of a level and keep the achieved goals; return whether that succeeded."""
         return self.achieve_goals(level, {cell: self.goal[cell]}, *budgets)
@@ -188,6 +201,7 @@ class Call:
             given_up=given_up,
             saving=self.saving,
             bound=self.bound if plan is not None else None,
+            effort=self.space.effort,
         )
 
     def tree(self) -> Plan:
@@ -209,6 +223,22 @@ def fresh_call(call: Call, problem: Problem) -> Call:
     other = Call(problem, call.using, call.space.deadline, call.space.most)
     other.refiner.found, other.refiner.nogoods.known = call.refiner.found, call.refiner.nogoods.known
     return other
+
+
+def as_refined(call: Call, steps: Sequence[Step]) -> list[RefinedStep]:
+    """Return the steps of a plan as instances of `RefinedStep`."""
+    names = call.program.variables
+    return [
+        RefinedStep(
+            step.level,
+            step.behavior,
+            step.arguments,
+            tuple(step.bindings.get(name, "") for name in names[step.behavior]) if step.bindings else (),
+            tuple(as_refined(call, step.steps)),
+            tuple(as_refined(call, step.joined)),
+        )
+        for step in steps
+    ]
 
 
 def bring_to_rest(call: Call) -> bool:

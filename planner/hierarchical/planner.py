@@ -21,14 +21,15 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from time import perf_counter
 
 from confab.planner.hierarchical.agenda import Agenda
-from confab.planner.hierarchical.call import Call, Compiled, compiled
-from confab.planner.hierarchical.scope import BITS
+from confab.planner.hierarchical.call import Call, Compiled, as_refined, compiled
+from confab.planner.hierarchical.scope import BITS, MAKING
 from confab.planner.hierarchical.shortening import ORDERS, shortened
 from confab.planner.hierarchical.unsolvability import FINALLY
-from confab.planner.hierarchical.windows import as_refined, regroupings
+from confab.planner.hierarchical.windows import regroupings
 from confab.planner.plan import Limits, Outcome, Reason, Status, UnsolvableError, paused_collection
 from confab.planner.transitions import arguments_of
 from confab.planner.validation import validate
@@ -46,6 +47,8 @@ FLAT_ROWS = 30_000
 """Maximum number of rows of a join when a task of one level is grounded as a whole."""
 TRIALS = 1_000_000
 """Maximum number of trials if a level can't be grounded; a trial is the test of one behaviour in one state."""
+BRIEFLY = 16
+"""The lowest level is searched as a whole, during a restart, with the effort so far divided by this number."""
 NOT_LEFT = "levels must not be left"
 SEARCHING, SHORTENING = 0.93, 0.85
 """Shares of the time limit after which the search ends, and after which a plan isn't shortened any more.
@@ -69,6 +72,7 @@ def plan(
     using: Compiled | None = None,
     leave_levels: bool = True,
     advised: Callable[[Call], None] = alone,
+    first: Outcome | None = None,
 ) -> Outcome:
     """Plan: achieve the goals of a problem one after another, and refine each step at once.
 
@@ -84,6 +88,8 @@ def plan(
         Whether steps of a lower level may replace steps of a level that has no plan with refinements.
     advised : function of a call, optional
         Function that attaches advice to the call.
+    first : Outcome, optional
+        The outcome of an earlier call for the same problem; its plan is shortened instead of searching for a first plan.
 
     Returns
     -------
@@ -91,7 +97,7 @@ def plan(
     """
     begin = perf_counter()
     with within(limits.seconds), paused_collection():
-        outcome = _plan(problem, limits, improve, using, leave_levels, advised)
+        outcome = _plan(problem, limits, improve, using, leave_levels, advised, first)
     return replace(outcome, seconds=perf_counter() - begin)
 
 
@@ -102,11 +108,12 @@ def _plan(
     using: Compiled | None,
     leave_levels: bool,
     advised: Callable[[Call], None],
+    first: Outcome | None,
 ) -> Outcome:
     deadline, until = limits.end(SEARCHING), limits.end(SHORTENING)
     one_level = improve > 0 and len(problem.domain.levels) == 1
     flat = None
-    if one_level and advised is alone:
+    if one_level and advised is alone and first is None:
         flat = flat_first(problem, limits, deadline)  # saves compiling thousands of conditional effects
         if flat.status is Status.SOLVED and deadline is None:
             return flat
@@ -117,9 +124,9 @@ def _plan(
     call.space.most_work, call.space.shortening = limits.work, limits.shortening
     advised(call)
     levels = call.program.levels if leave_levels else call.program.levels[:1]
-    agenda = Agenda(call, levels)
+    agenda = Agenda(call, levels, below=partial(below, call, limits) if leave_levels else None)
     try:
-        done = one_level and by_rules_alone(call)
+        done = (first is not None and call.resume(first)) or (one_level and by_rules_alone(call))
         if one_level and not done:
             flat = flat or flat_first(problem, limits, deadline)
             call.count(flat)
@@ -151,6 +158,20 @@ def before_the_check(call: Call, until: float | None) -> float | None:
     with suppress(LimitError):
         validate(call.problem, call.tree())
     return min(until, deadline.at - CHECKS * (perf_counter() - begin))
+
+
+def below(call: Call, limits: Limits) -> bool:
+    """Search the lowest level briefly; return whether steps of the first level, which these steps refine, achieve all goals."""
+    most = call.space.effort // BRIEFLY
+    flat = lowest_alone(call, limits, BITS * most, 5 * most // MAKING)
+    if flat.plan is None:
+        return False
+    plan = regroupings(call.problem, flat.plan, call.program.levels[-1], call.using)[0]
+    if any(step.level != call.program.levels[0] for step in plan.steps) or validate(call.problem, plan):
+        return False
+    call.steps = as_refined(call, plan.steps)
+    call.replace_steps(call.steps)
+    return all(map(call.met, call.goal))
 
 
 def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool) -> Outcome:
@@ -218,7 +239,7 @@ def flat_first(problem: Problem, limits: Limits, deadline: float | None) -> Outc
     return plan_level(problem, limits=limits.until(deadline), most_work=FLAT, most_rows=FLAT_ROWS)
 
 
-def lowest_alone(call: Call, limits: Limits, most_work: float) -> Outcome:
+def lowest_alone(call: Call, limits: Limits, most_work: float, most_rows: int | None = None) -> Outcome:
     """Search the lowest level from the initial state.
 
     If a changed symbol isn't at rest at the end of the plan, the plan is invalid. The search is then repeated with all rest values
@@ -232,7 +253,7 @@ def lowest_alone(call: Call, limits: Limits, most_work: float) -> Outcome:
     rests = {Symbol(cell[0], arguments_of(cell[1])): value for cell, value in restless.items()}
     goal = problem.goal_on(lowest)
     for wanted in (goal, {**rests, **goal}):
-        flat = plan_level(problem, lowest, None, wanted, limits.until(deadline), most_work)
+        flat = plan_level(problem, lowest, None, wanted, limits.until(deadline), most_work, most_rows)
         call.count(flat)
         if not rests or flat.plan is None or not validate(problem, flat.plan):
             break

@@ -21,9 +21,9 @@ from random import Random
 from time import perf_counter
 
 from confab.planner.hierarchical.agenda import Agenda
-from confab.planner.hierarchical.call import Call, fresh_call
+from confab.planner.hierarchical.call import Call, as_refined, fresh_call
 from confab.planner.hierarchical.detours import without_detours
-from confab.planner.hierarchical.windows import as_refined, improves, lower_bound, primitives, regroupings, windowed
+from confab.planner.hierarchical.windows import improves, lower_bound, primitives, regroupings, windowed
 from confab.planner.plan import Plan
 from confab.planner.plan_costs import compared
 from confab.planner.transitions import Cell, arguments_of, key_of
@@ -68,11 +68,10 @@ def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Cal
     least = LEAST_ROUNDS if costs_depend(call) else 1
     if prices(call) > 1 and call.bound is None:
         call.bound = lower_bound(call)
-    brief, repeated = (call.space.shortening == name for name in ("brief", "repeated"))
-    improve = 1 if brief else improve
+    improve = 1 if call.space.shortening == "brief" else improve
     work, random = max(call.space.effort, LEAST_EFFORT) * improve // (2 * ORDERS), Random(0)
     rounds = useful = 0
-    most = 0 if brief and call.space.deadline is not None else inf if repeated else 1
+    most = {"none": 0, "brief": int(call.space.deadline is None), "once": 1, "repeated": inf}[call.space.shortening]
     while rounds < min(most, max(least, 2 * useful)):
         before, begin = cost(call), perf_counter()
         shorten_once(call, work, leave_levels, advised, random)

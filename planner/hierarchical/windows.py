@@ -11,13 +11,13 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from confab.planner.hierarchical.agenda import Agenda
-from confab.planner.hierarchical.call import Call, Compiled, fresh_call
+from confab.planner.hierarchical.call import Call, Compiled, as_refined, fresh_call
 from confab.planner.hierarchical.detours import parts
 from confab.planner.hierarchical.inherited_preconditions import binding
 from confab.planner.hierarchical.refinement import RefinedStep
 from confab.planner.hierarchical.workspace import Ground
 from confab.planner.levels import levels_left
-from confab.planner.plan import Plan, Step, UngroundableError
+from confab.planner.plan import Plan, UngroundableError
 from confab.planner.plan_costs import compared
 from confab.planner.validation import validate
 from confab.reasoner.symbols import Problem
@@ -108,22 +108,6 @@ def regroupings(problem: Problem, plan: Plan, level: int, using: Compiled) -> tu
     from confab.planner.hierarchical.regrouping import under_the_levels_above
 
     return under_the_levels_above(problem, plan, using), plan
-
-
-def as_refined(call: Call, steps: Sequence[Step]) -> list[RefinedStep]:
-    """Return the steps of a plan as instances of `RefinedStep`."""
-    names = call.program.variables
-    return [
-        RefinedStep(
-            step.level,
-            step.behavior,
-            step.arguments,
-            tuple(step.bindings.get(name, "") for name in names[step.behavior]) if step.bindings else (),
-            tuple(as_refined(call, step.steps)),
-            tuple(as_refined(call, step.joined)),
-        )
-        for step in steps
-    ]
 
 
 def primitives(steps: Sequence[RefinedStep]) -> list[RefinedStep]:

@@ -52,7 +52,7 @@ class Workspace:
     most_work : float
         Maximum work in scopes (number of states times number of operators); `LimitError` is raised above this work.
     shortening : str
-        Work for a shorter plan: "brief", "once" or "repeated" (`Limits.shortening`).
+        Work for a shorter plan: "none", "brief", "once" or "repeated" (`Limits.shortening`).
     dead_end_check : function
         Function that tests whether the problem is unsolvable; it is called each time that the effort has doubled.
     """

@@ -40,6 +40,18 @@ def written(tmp_path: Path, old: str, new: str) -> str:
     return str(tmp_path / "scene.ttl")
 
 
+def recorded(monkeypatch: pytest.MonkeyPatch) -> list[Request]:
+    """Return a list to which each later request of a planning call is added."""
+    asked = list[Request]()
+
+    def solved(request: Request) -> Outcome:
+        asked.append(request)
+        return solve(request)
+
+    monkeypatch.setattr("confab.plan_call.solve", solved)
+    return asked
+
+
 def default(problem: Problem) -> Outcome:
     return solve(Request(problem))
 
@@ -117,13 +129,7 @@ def test_soft_goals_that_are_known_to_exclude_each_other_are_not_searched_again(
 
 
 def test_the_search_of_a_choice_of_soft_goals_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked = list[Request]()
-
-    def recorded(request: Request) -> Outcome:
-        asked.append(request)
-        return solve(request)
-
-    monkeypatch.setattr("confab.plan_call.solve", recorded)
+    asked = recorded(monkeypatch)
     shop = confab.load("wishes-small")
     wishes = shop.problem.weights.keys()
     result = shop.plan(engine="none")
@@ -320,6 +326,25 @@ def test_a_brief_call_with_a_time_limit_leaves_the_first_plan_as_it_is() -> None
     assert first.plan is not None
     assert first.saving is None
     assert solve(Request(problem, limits=Limits(seconds=1.0, shortening="repeated"))).saving is not None
+
+
+def test_sets_of_soft_goals_are_searched_from_no_and_from_all_soft_goals() -> None:
+    """From all soft goals alone, single changes lead to a total of 259."""
+    result = confab.load("wishes-large").plan()
+    assert result.cost is not None
+    assert Fraction(result.cost) + sum(one.weight for one in result.outcome.forgone) <= 237
+    assert all(one.price is None or one.price >= one.weight for one in result.outcome.forgone)
+
+
+def test_the_plan_of_the_best_set_of_soft_goals_is_shortened_instead_of_searched_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked = recorded(monkeypatch)
+    confab.load("wishes-small").plan(engine="none")
+    goals = [frozenset(request.problem.goal) for request in asked if request.first is None]
+    assert len(goals) == len(set(goals))
+    assert asked[-1].first is not None
+    assert asked[-1].first.plan is not None
 
 
 def test_limited_work_for_comparing_choices_of_soft_goals_gives_the_same_total_cost() -> None:

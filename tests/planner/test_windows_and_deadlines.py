@@ -185,7 +185,9 @@ def test_a_longer_plan_is_scheduled_if_a_cheapest_plan_misses_its_deadlines(
     more = {Symbol("CLEAN", ("hall",)): "true"} if longer else {}
 
     def searched(task: Any, problem: Problem, how: confab.plan_call.Searching) -> Outcome:
-        return search(task, replace(problem, goal={**problem.goal, **more}) if how.brief else problem, how)
+        return search(
+            task, replace(problem, goal={**problem.goal, **more}) if how.shortening == "brief" else problem, how
+        )
 
     def scheduled(problem: Problem, outcome: Outcome, *rest: Any) -> tuple[Outcome, TimedPlan | None]:
         plans.append(len(outcome.plan.primitives) if outcome.plan else 0)
