@@ -113,6 +113,7 @@ CALLS: tuple[tuple[str, str], ...] = (
     ("SOFT", "scene.plan(time_limit=S)"),
     ("TIMED", "scene.execute(time_limit=S)"),
     ("TIMED", "scene.explain(time_limit=S)"),
+    ("TIMED", "within: confab.Memory.of(scene).teach(scene, result)"),
 )
 """Calls in Python, each with its scene or group of scenes. `within` stands for a block of `confab.within(S)`."""
 BEGUN = """

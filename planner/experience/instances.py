@@ -19,6 +19,7 @@ from confab.planner.hierarchical.operators import FEW, Achiever
 from confab.planner.hierarchical.symmetry import representatives
 from confab.planner.transitions import Cell, arguments_of, key_of
 from confab.reasoner.amounts import meets, towards
+from confab.reasoner.limits import check, checked
 from confab.reasoner.memory.experience import Ground, LearnedRule
 from confab.reasoner.symbols import FALSE, TRUE, ValueCondition
 
@@ -240,6 +241,7 @@ class Instances:
             least, found = self.cost(level, goal, suggested_or_not), False
             left = self.of((level, goal, suggested_or_not)) if least < inf else []
             for cost in range(int(least), int(min(least + SLACK + 1, below))) if left else ():
+                check("comparing applications of rules")
                 equal = [one for one in left if self.instance_within(level, one, cost, suggested_or_not)]
                 taken = {*map(id, equal)}  # comparing the instances themselves takes longer
                 left, found = [one for one in left if id(one) not in taken], found or bool(equal)
@@ -261,7 +263,8 @@ class Instances:
         if len(instances) < 2:
             yield from instances
             return
-        rank = {id(one): (self.undone(level, one), len(one.unmet)) for one in instances}
+        every = checked(instances, "comparing applications of rules")
+        rank = {id(one): (self.undone(level, one), len(one.unmet)) for one in every}
         for _, alike in groupby(sorted(instances, key=lambda one: rank[id(one)]), key=lambda one: rank[id(one)]):
             group = list(alike)
             if self.score is not None and len(group) > 1:

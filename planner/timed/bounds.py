@@ -20,7 +20,7 @@ from confab.planner.plan import Reason, UngroundableError
 from confab.planner.timed.pieces import actors_of, default_actors, duration_of, pieces_of
 from confab.planner.validation import LoggedState
 from confab.reasoner.amounts import situations_in
-from confab.reasoner.limits import OutOfTimeError, current
+from confab.reasoner.limits import OutOfTimeError, checked, current
 from confab.reasoner.symbols import Parameter, Problem, Span
 from confab.reasoner.timing import timing_of
 
@@ -55,7 +55,7 @@ def of_any_plan(problem: Problem) -> Fraction:
     task.costs[:] = [seconds * many for seconds, many in zip(lasts, actors, strict=True)]
     work = ways(task)(task.initial)
     if len(task) <= MOST_CUT:
-        work = max(work, lm_cut(task)(task.initial))
+        work = max(work, lm_cut(task, current().at)(task.initial))
     least = max(_chain(task, lasts), work / every if every else 0.0)
     return Fraction(int(least * PARTS), PARTS) if isfinite(least) else Fraction(0)
 
@@ -67,7 +67,7 @@ def _durations(problem: Problem, task: Task) -> tuple[list[float], list[int], in
     fixed: dict[str, tuple[Parameter, ...]] = {}
     constant: dict[tuple[str, tuple[str, ...]], float | None] = {}
     lasts, actors = list[float](), list[int]()
-    for operator in range(len(task)):
+    for operator in checked(range(len(task)), "bounding the makespan"):
         name, arguments, bindings = task.describe(operator)
         behavior = problem.domain.behaviors[name]
         given = dict(zip((p.name for p in behavior.parameters), arguments, strict=True))

@@ -29,7 +29,7 @@ from confab.planner.timed.schedules import (
 )
 from confab.planner.timed.validation import validate_timed
 from confab.planner.validation import Cell, validate
-from confab.reasoner.limits import LimitError, check, overtime
+from confab.reasoner.limits import LimitError, check, overtime, within
 from confab.reasoner.symbols import Fact, Problem, Times
 
 
@@ -87,7 +87,7 @@ def best_in_time(
         return Timed(reason=Reason(str(limit)))
     bound = Fraction(0)
     if shorten:
-        with suppress(LimitError):
+        with suppress(LimitError), within(left(4)):
             bound = of_any_plan(problem)
         found = _spread(problem, plan, found, left(3), separation)
     if not enough(found):
