@@ -19,8 +19,9 @@ import sys
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from importlib import import_module
 from inspect import CO_OPTIMIZED
 from itertools import accumulate, islice
@@ -34,6 +35,7 @@ from typing import Any, TypedDict
 from benchmarks.mixed import SHARES
 from benchmarks.mutants import LIBRARIES, ROOT, Instead, faults, meaning
 from confab.planner.certificates import Certificate
+from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.symbols import Problem
 from confab.scene import Scene, load
 from worlds import judging
@@ -41,6 +43,7 @@ from worlds.false_certificates import accepted, corrupted, of_a_task_with_a_plan
 from worlds.interpreter import Interpreter
 from worlds.mixed import RandomWorld, drawn
 from worlds.scenes import scene
+from worlds.slices import Slice
 
 CHECKERS = sorted(f"planner/{file.name}" for file in (ROOT / "planner").glob("checked_*.py"))
 PARTS: dict[str, dict[str, str]] = {
@@ -60,7 +63,7 @@ A planner that gives up in a world without a plan counts as a fault of a proof.
 """
 FIRST, WORLDS = 8_000_000, 200
 """First seed and number of worlds."""
-BUDGET, PLANS = 4.0, 6
+BUDGET, PLANS = 2.0, 6
 """CPU seconds of the worlds that are judged with a fault, as measured without the fault; number of changed copies of each plan."""
 SECONDS, WAITING = 60, 600.0
 """CPU seconds for the worlds of a fault, and seconds by the clock for a call on a busy machine."""
@@ -107,6 +110,8 @@ def kills(many: int, into: Path, chosen: Sequence[str] = ()) -> None:
             its = [file for file in files if files[file] == mode]
             texts = "".join((ROOT / file).read_text("utf-8") for file in its)
             checks = {world.seed: check(world, meant, mode) for world, meant in worlds}
+            functions()
+            gc.freeze()  # no collection in a forked process touches, and so copies, the memory of the worlds
             before = traced(its, checks, into / f"mixed-{mode}-{hashed(judge + texts)}.json")
             for file in its:
                 source = (ROOT / file).read_text("utf-8")
@@ -235,9 +240,15 @@ def put(file: str, text: str) -> None:
     """Put the changed functions of a text into a module: all users of the functions get the changed code."""
     import_module(Instead(file, "").name)
     different = changes((ROOT / file).read_text("utf-8"), text)
-    for one in gc.get_objects():
-        if isinstance(one, FunctionType) and one.__code__ in different:
+    for one in functions():
+        if one.__code__ in different:
             one.__code__ = different[one.__code__]
+
+
+@cache
+def functions() -> list[FunctionType]:
+    """Return all functions; called before the processes are forked, which then needn't look for them."""
+    return [one for one in gc.get_objects() if isinstance(one, FunctionType)]
 
 
 def changes(source: str, text: str) -> dict[CodeType, CodeType]:
@@ -313,12 +324,14 @@ def check(world: RandomWorld, meant: Interpreter, mode: str) -> Check:
 
 def recognition(judge: judging.Judge, read: Scene, file: Path) -> Callable[[], None]:
     """Return the check of recognition in a world."""
-    slices = [*judge.slices(read), *judge.crowd(file)]
+    usual: list[tuple[Slice, Problem]] = []
+    for one in (*judge.slices(read), *judge.crowd(file)):
+        with suppress(KnowledgeError):  # the scene is refused
+            usual.append((one, one.part().problem))
     renamed = judge.renamed(file)
-    usual = [one.part().problem for one in slices]
 
     def compare() -> None:
-        for one, problem in zip(slices, usual, strict=True):
+        for one, problem in usual:
             part = one.part()
             if part.problem != problem and one.wrong(part):
                 judge.complain("the part of the scene differs", "recognition")

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from random import Random
 
-from confab.planner.certificate_checks import refusal
+from confab.planner.certificate_checks import is_bounded, refusal
 from confab.planner.certificates import Certificate
 from confab.reasoner.amounts import Quantity, written
 from confab.reasoner.symbols import FALSE, TRUE, Fact, Problem, Symbol
@@ -17,7 +17,7 @@ MOST_STATES = 600
 """Maximum number of states of a world in which certificates with a missing claim are refuted by search."""
 SAMPLE = 20
 """Number of reachable states that are changed to refute a certificate."""
-SHARES = (0.0, 0.3, 0.6, 1.0)
+SHARES = (0.0, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0)
 """Shares of the symbols whose values a random certificate tells apart."""
 COUNTED = re.compile(r"(\d+) cases can be reached")
 """The message of the checker for a wrong number of cases."""
@@ -71,10 +71,14 @@ def corrupted(problem: Problem, certificate: Certificate, rng: Random) -> Iterat
 def of_a_task_with_a_plan(
     problem: Problem, meant: Interpreter, reached: Sequence[State], rng: Random
 ) -> Iterator[tuple[str, Certificate]]:
-    """Yield random certificates of a task that has a plan; all claims except those about the goal hold in all reachable states."""
+    """Yield random certificates of a task that has a plan; all claims except those about the goal hold in all reachable states.
+
+    One certificate claims that the goal excludes a fact that no task requires.
+    """
     symbols = [symbol for symbol, slot in meant.slots.items() if slot < meant.stated]
     rests = {s: kind.rest for s in symbols if (kind := meant.kinds[s.situation]).rest and s not in problem.goal}
     final = sorted(Fact(symbol, value) for symbol, value in {**rests, **problem.goal}.items())
+    bounded = tuple(symbol for symbol in meant.symbols if is_bounded(problem, symbol))
     for share in SHARES:
         apart = {symbol: () for symbol in symbols if rng.random() < share}
         always, never = dict[Symbol, str](), set[Fact]()
@@ -90,7 +94,19 @@ def of_a_task_with_a_plan(
                 others = (FALSE, TRUE) if kind.boolean else problem.members(kind.range)
                 never.update(Fact(symbol, value) for value in others if value not in values)
         unmet = tuple(rng.sample(final, rng.randint(1, len(final))))
-        yield f"at random, {share:.0%} told apart", Certificate(frozenset(never), always, apart, 1, unmet)
+        found = Certificate(frozenset(never), always, apart, 1, unmet, bounded if rng.random() < 0.7 else ())
+        yield f"at random, {share:.0%} told apart", found
+    ends = [state for state in reached if meant.wanted(state)]
+    for symbol in rng.sample(symbols, len(symbols)):
+        value = meant.value(meant.initial, symbol)
+        if meant.kinds[symbol.situation].quantity is None and all(
+            meant.value(state, symbol) != value for state in ends
+        ):
+            fact = Fact(symbol, NOTHING)
+            if ends and fact.symbol not in rests and fact.symbol not in problem.goal:
+                found = Certificate(told_apart=dict.fromkeys(symbols, ()), unmet=(*final, fact))
+                yield "with a fact that the task doesn't require", found
+                break
 
 
 def accepted(problem: Problem, what: str, certificate: Certificate) -> bool:

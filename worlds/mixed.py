@@ -97,21 +97,22 @@ def drawn(
     mutual: float = 0.0,
     priced: float = 0.0,
     everyone: float = 0.0,
+    repeated: float = 0.0,
 ) -> tuple[RandomWorld, Interpreter]:
     """Return the random world of a seed, and an interpreter of the world.
 
     Parameters
     ----------
     seed : int
-    aggregated, constrained, remembered, mutual, priced, everyone : float
+    aggregated, constrained, remembered, mutual, priced, everyone, repeated : float
         The shares of worlds with derived amounts, with constraints on every state, with remembered situation types, with two
-        situation types that define each other, with behaviours whose costs depend on amounts, and with a goal about all
-        individuals of a class.
+        situation types that define each other, with behaviours whose costs depend on amounts, with a goal about all individuals
+        of a class, and with behaviours that change a situation type by several effects.
     """
     rng = Random(f"mixed {seed}")
     most, least = (MOST, FEW if rng.random() < 0.5 else 2) if rng.random() > UNBOUNDED else (MOST // 10, 0)
     while True:
-        world = _Draft(rng, seed, aggregated, constrained, remembered, mutual, priced).world()
+        world = _Draft(rng, seed, aggregated, constrained, remembered, mutual, priced, repeated=repeated).world()
         interpreter = Interpreter(world.problem)
         try:
             costs = interpreter.explored(world.problem.domain.levels[-1], most, False).costs
@@ -146,8 +147,8 @@ def crowded(seed: int, constrained: float = 0.0) -> tuple[RandomWorld, Interpret
         for name, arguments in rng.choices(names, k=WALK) if names else ():
             states += [state for _, state in list(meant.done(name, arguments, states[-1]))[:1] if state != states[-1]]
         first, last = states[0], states[-1]
-        changed = [symbol for symbol, i in meant.slots.items() if i < meant.stated and first[i] != last[i]]
-        if changed:
+        changed = [s for s, i in meant.slots.items() if i < meant.stated and first[i] != last[i] and _sayable(last[i])]
+        if changed and len(set(states)) >= FEW:
             symbol = rng.choice(changed)
             value = meant.value(last, symbol)
             goal = {symbol: value if isinstance(value, str) else written(value)}
@@ -272,10 +273,14 @@ class _Wishes:
         if self.of.kinds[symbol.situation].quantity is None:
             return str(value)
         sign = self.rng.choice(("=", ">=", "<=", "<", ">"))
-        number = Fraction(str(value))
-        number = number if number.denominator in (1, 2, 4) and abs(number) < 100 else Fraction(1)
+        number = Fraction(str(value)) if _sayable(value) else Fraction(1)
         number += {"<": 1, ">": -1}.get(sign, 0)
         return written(number) if sign == "=" else f"{sign}{written(number)}"
+
+
+def _sayable(value: Any) -> bool:
+    """Return whether a scene can state a value: a name, or a number with few digits."""
+    return isinstance(value, str) or (Fraction(value).denominator in (1, 2, 4) and abs(value) < 100)
 
 
 def _recursive(aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]]) -> bool:
@@ -302,8 +307,10 @@ class _Draft(Vocabulary):
         mutual: float,
         priced: float,
         crowd: int = 0,
+        repeated: float = 0.0,
     ) -> None:
         super().__init__(rng)
+        self.repeated = Random(f"repeated {seed}").random() < repeated
         self.crowd, self.valued = crowd, priced
         self.seed, self.share, self.prevented = seed, aggregated, constrained
         self.remembered, self.connected = remembered, mutual
@@ -371,7 +378,7 @@ class _Draft(Vocabulary):
     def situation(self, number: int) -> None:
         """Draw a situation type and its initial values."""
         rng = self.rng
-        kind = rng.choice("FFFPPRRQGNNM")
+        kind = rng.choice("FFFPPRRQGNNM" if number or not self.crowd else "FFR")
         name = f"{kind}{number}"
         level = rng.choice(range(1, self.levels + 1)) if number else 1
         owner = rng.choice(("A", "A", "B", "A1", "A|B"))
@@ -412,7 +419,7 @@ class _Draft(Vocabulary):
         """Draw a situation type with one value per object."""
         rng = self.rng
         members = tuple(f"{name}v{i}" for i in range(rng.choice((2, 2, 3))))
-        target = rng.choice(("", "", "", "A", "B"))
+        target = rng.choice(("A", "B", "B") if self.crowd else ("", "", "", "A", "B"))
         if target:
             members = members[: rng.choice((0, 1, 1, 2))]
             if len({*members, *self.classes[target]}) < 2:
@@ -430,6 +437,11 @@ class _Draft(Vocabulary):
             rest = rng.choice(first)
             start = {row: value if self.chance(0.05) else rest for row, value in start.items()}
         default = rest if rest is not None else rng.choice(first) if len(arguments) > 1 or self.chance(0.2) else None
+        if (
+            self.crowd and rest is None and target and self.chance(0.4)
+        ):  # no query leads from an unstated value to its objects
+            default = rng.choice(first)
+            start = {row: default if self.chance(0.4) else value for row, value in start.items()}
         self.situations[name] = SituationType(name, arguments, name, level, rest, default)
         self.initial |= {Symbol(name, row): value for row, value in start.items()}
 
@@ -549,20 +561,24 @@ class _Draft(Vocabulary):
 
     def joining(self, writer: Phrases, one: str, other: str) -> Condition:
         """Return a condition that relates two individuals, if possible by a value of the first."""
-        of = set(writer.kinds_of(one))
-        found = [
-            s
-            for s in self.situations.values()
-            if len(s.arguments) == 1
-            and s.level <= writer.level
-            and of & set(self.classes[s.arguments[0]])
-            and set(writer.kinds_of(other)) & set(self.classes.get(s.range, ()))
+        of, to = set(writer.kinds_of(one)), set(writer.kinds_of(other))
+        fitting = [
+            s for s in self.situations.values() if s.level <= writer.level and of & {*self.classes[s.arguments[0]]}
         ]
+        found: list[Condition] = [
+            ValueCondition(s.name, (one,), other)
+            for s in fitting
+            if len(s.arguments) == 1 and to & {*self.classes.get(s.range, ())}
+        ]
+        if self.crowd:
+            found += [
+                ValueCondition(s.name, (one, other), TRUE)
+                for s in fitting
+                if s.boolean and len(s.arguments) == 2 and to & {*self.classes[s.arguments[1]]}
+            ]
         if "near" in self.relations and self.crowd and self.chance(0.5):
             return RelationCondition("near", (one, other))
-        if not found:
-            return writer.value([one, other], one)
-        return ValueCondition(self.rng.choice(found).name, (one,), other)
+        return self.rng.choice(found) if found else writer.value([one, other], one)
 
     def bounded(self, problem: Problem) -> Problem:
         """Return the problem with bounds on some sums and counts; the bounds hold initially."""
@@ -711,9 +727,12 @@ class _Draft(Vocabulary):
     def behavior(self, name: str, level: int, sure: bool = False) -> Behavior:
         """Return a behaviour that is independent of the level above."""
         rng, writer = self.rng, Phrases(self, level)
-        parameters = [writer.fresh(rng.choice(("A", "A", "B", "A1"))) for _ in range(rng.choice((0, 1, 1, 2, 2)))]
+        parameters = [
+            writer.fresh(rng.choice(("A", "A", "B", "A1")))
+            for _ in range(rng.choice((1, 2, 2, 3) if self.crowd else (0, 1, 1, 2, 2)))
+        ]
         bound = list(parameters)
-        conditions = writer.conditions(bound, rng.choice((0, 0, 1) if self.crowd else (0, 1, 1, 2, 3)), 1)
+        conditions = writer.conditions(bound, rng.choice((0, 0, 0, 1) if self.crowd else (0, 1, 1, 2, 3)), 1)
         if self.crowd:  # related parameters lead recognition to few individuals
             pairs = [(one, self.rng.choice(parameters[:i])) for i, one in enumerate(parameters) if i]
             conditions += [

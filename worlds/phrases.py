@@ -54,6 +54,8 @@ class Vocabulary:
         self.aggregates: dict[str, Aggregate] = {}
         self.remembers: dict[str, str] = {}
         self.objects: tuple[str, ...] = ()
+        self.repeated = False
+        """Whether several effects of a behaviour may change one situation type."""
         self.crowd = 0
         """Number of additional individuals of each class; with such individuals, few effects concern a whole class."""
 
@@ -94,7 +96,7 @@ class Phrases:
         """Return a term for an argument of a class, usually a term of the class and sometimes a term of another class."""
         members = self.draft.classes[kind]
         fitting = [t for t in bound if set(self.kinds_of(t)) & set(members)]
-        if fitting and self.rng.random() < 0.92:
+        if fitting and self.rng.random() < (0.98 if self.draft.crowd else 0.92):
             return self.rng.choice(fitting)
         if members:
             return self.rng.choice(members)
@@ -250,20 +252,26 @@ class Phrases:
     # ----------------------------------------------------------------------------------------------------------- effects
 
     def effect(self, bound: list[str], values: list[ValueEffect], numbers: list[AmountEffect]) -> None:
-        """Draw an effect that contradicts no existing effect, and add it to `values` or `numbers`."""
+        """Draw an effect, and add it to `values` or `numbers`; except in `repeated` worlds, it contradicts no existing effect."""
         rng, draft = self.rng, self.draft
         of_numbers = self.seen(quantity=True, changeable=True)
-        one = rng.choice([*self.seen(changeable=True), *of_numbers] or [None])
+        of_values = self.seen(changeable=True)
+        one = rng.choice([*of_values, *of_numbers] or [None])
+        if draft.crowd:  # effects on parameters lead recognition to few individuals
+            members = {one for term in bound for one in self.kinds_of(term)}
+            known = [s for s in of_values if all(members & {*draft.classes[of]} for of in s.arguments)]
+            moving = [s for s in known if members & {*draft.classes[s.range]}]
+            one = rng.choice((moving if rng.random() < 0.6 else known) or [one])
         if one is None:
             return
         each, terms = None, list[str | None]()
         for kind in one.arguments:
-            if each is None and kind in ("A", "B", "A1") and rng.random() < (0.08 if draft.crowd else 0.25):
+            if each is None and kind in ("A", "B", "A1") and rng.random() < (0.03 if draft.crowd else 0.25):
                 each = Parameter(EACH, rng.choice((kind, kind, "A1")))
                 self.inner[EACH] = each.kind
                 terms.append(EACH)
             elif (
-                kind in ("A", "B", "A1") and len(self.kinds) < MOST_TERMS and rng.random() < 0.7
+                kind in ("A", "B", "A1") and len(self.kinds) < MOST_TERMS and rng.random() < (0.1 if draft.crowd else 0.7)
                 and not any(set(self.kinds_of(t)) & set(draft.classes[kind]) for t in bound)
             ):  # fmt: skip
                 bound.append(self.fresh(kind))
@@ -279,7 +287,7 @@ class Phrases:
             if each and _mentions_twice(when[0]):
                 when = ()
         if one.quantity is not None:
-            if any(change.situation == one.name for change in numbers):
+            if not draft.repeated and any(change.situation == one.name for change in numbers):
                 return
             by: Expression = Fraction(rng.choice((1, 1, 1, 2)))
             operation = rng.choice(("increase", "increase", "decrease", "decrease", "assign", "scale"))
@@ -292,13 +300,14 @@ class Phrases:
         if one.boolean:
             value = rng.choice((TRUE, TRUE, FALSE))
         else:
-            if any(effect.situation == one.name for effect in values):
+            if not draft.repeated and any(effect.situation == one.name for effect in values):
                 return
             visible = self.visible(draft.classes[one.range])
             fitting = [t for t in bound if set(self.kinds_of(t)) and set(self.kinds_of(t)) <= set(visible)]
             if not visible and not fitting:
                 return
-            value = rng.choice(fitting) if fitting and rng.random() < 0.5 else rng.choice(visible or fitting)
+            among = fitting if fitting and rng.random() < (0.8 if draft.crowd else 0.5) else visible or fitting
+            value = rng.choice(among)
         values.append(ValueEffect(one.name, arguments, value, when, each))
 
 
