@@ -40,10 +40,15 @@ def projected(
     """Return the preconditions and effects of a behaviour that no other step overlaps.
 
     A condition that an effect at the start achieves is omitted; an effect at the start that a later effect overwrites is omitted,
-    too.
+    too. Increases, decreases and factors overwrite nothing, and equal ones add up.
     """
     given = {effect for span, effect in effects if span is Span.START and isinstance(effect, ValueEffect)}
-    later = {(e.situation, e.arguments) for span, e in effects if span is not Span.START and not e.when and not e.each}
+    later = {
+        (e.situation, e.arguments)
+        for span, e in effects
+        if span is not Span.START and not e.when and not e.each
+        if isinstance(e, ValueEffect) or e.operation == "assign"
+    }
 
     def brought_about(span: Span, condition: Condition) -> bool:
         return (
@@ -55,7 +60,7 @@ def projected(
 
     asked = tuple(dict.fromkeys(c for span, c in conditions if not brought_about(span, c)))
     made = tuple(e for span, e in effects if span is not Span.START or (e.situation, e.arguments) not in later)
-    return asked, tuple(dict.fromkeys(made))
+    return asked, made
 
 
 def only_during(problem: Problem) -> frozenset[str]:

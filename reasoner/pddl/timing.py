@@ -97,7 +97,7 @@ def timing(
         own = (*conditions, *(c for at, c in asked if at is not Span.THROUGHOUT))
         made += [(SPANS[span], one) for one in table.value_effects(values, variables, own)]
         made += [(SPANS[span], one) for one in table.amount_effects("", numbers, variables, own)]
-    return Timing(table.number(parts.duration, {}), (), tuple(dict.fromkeys(asked)), tuple(dict.fromkeys(made)))
+    return Timing(table.number(parts.duration, {}), (), tuple(dict.fromkeys(asked)), tuple(made))
 
 
 def snapped(pddl: Pddl, effects: Mapping[str, Sequence[PddlEffect]]) -> tuple[Pddl, dict[str, tuple[PddlEffect, ...]]]:

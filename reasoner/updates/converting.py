@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -368,7 +369,11 @@ def plainly(behavior: Behavior) -> object:
         behavior.price,
         _plain(behavior.asked),
         frozenset(effects),
-        frozenset((e.situation, e.arguments, e.operation, e.amount, _plain(e.when), e.each) for e in behavior.amounts),
+        frozenset(
+            Counter(
+                (e.situation, e.arguments, e.operation, e.amount, _plain(e.when), e.each) for e in behavior.amounts
+            ).items()
+        ),
         behavior.timing and (behavior.timing.duration, behavior.timing.actors, spans_of(behavior)),
     )
 

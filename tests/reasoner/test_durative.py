@@ -109,6 +109,22 @@ def test_a_scene_file_keeps_all_durations_and_timed_conditions_of_a_pddl_domain(
             assert set(again.timing.asked(span)) == set(behavior.timing.asked(span))
 
 
+def test_what_a_step_takes_at_its_start_and_gives_back_at_its_end_is_unchanged_and_equal_increases_add_up(
+    tmp_path: Path,
+) -> None:
+    domain = """(define (domain crane) (:requirements :durative-actions :fluents) (:functions (power) (height))
+      (:durative-action lift :parameters () :duration (= ?duration 5) :condition (at start (>= (power) 2))
+        :effect (and (at start (decrease (power) 2)) (at end (increase (power) 2))
+          (at end (increase (height) 1)) (at end (increase (height) 1)))))"""
+    problem = """(define (problem high) (:domain crane) (:init (= (power) 3) (= (height) 0))
+      (:goal (and (= (power) 3) (= (height) 4))))"""
+    path = tmp_path / "scene.ttl"
+    path.write_text(turtle(imported(parse(domain, problem)).problem, "title", "description"), encoding="utf-8")
+    plan = confab.load(str(path)).plan(time_limit=20).plan
+    assert plan is not None
+    assert [step.behavior for step in plan.primitives] == ["LIFT", "LIFT"]
+
+
 def test_an_export_without_time_is_refused_where_a_value_holds_only_during_a_step() -> None:
     with pytest.raises(KnowledgeError, match="only while it lasts"):
         to_pddl(imported(parse(CELLAR, FUSES)).problem)
