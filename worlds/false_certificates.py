@@ -15,6 +15,8 @@ from worlds.interpreter import Interpreter, State, TooManyStatesError
 
 MOST_STATES = 600
 """Maximum number of states of a world in which certificates with a missing claim are refuted by search."""
+CHECKING = 200_000
+"""Maximum work of the checker for each certificate."""
 SAMPLE = 20
 """Number of reachable states that are changed to refute a certificate."""
 SHARES = (0.0, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0)
@@ -114,9 +116,9 @@ def accepted(problem: Problem, what: str, certificate: Certificate) -> bool:
 
     Unless the number of cases is what is wrong, the certificate gets the number that the checker counts.
     """
-    said = refusal(problem, certificate)
+    said = refusal(problem, certificate, CHECKING)
     if said is not None and "case" not in what and (counted := COUNTED.match(said)):
-        said = refusal(problem, replace(certificate, cases=int(counted[1])))
+        said = refusal(problem, replace(certificate, cases=int(counted[1])), CHECKING)
     return said is None
 
 
