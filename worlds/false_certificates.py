@@ -15,7 +15,7 @@ from worlds.interpreter import Interpreter, State, TooManyStatesError
 
 MOST_STATES = 600
 """Maximum number of states of a world in which certificates with a missing claim are refuted by search."""
-CHECKING = 200_000
+CHECKING = 30_000
 """Maximum work of the checker for each certificate."""
 SAMPLE = 20
 """Number of reachable states that are changed to refute a certificate."""
