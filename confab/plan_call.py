@@ -258,7 +258,8 @@ def searched(task: PlanningTask, problem: Problem) -> tuple[Problem, Outcome]:
         fixed = task.options.by_engine or mode == "paper"
         chosen, outcome = preferred(alike, choose, shorten=None if fixed else shorten)
     else:
-        prove = partial(search_in_time, task, Searching(mode, share=0.5), (seconds or 0.0) / 10, "the time limit")
+        least = max((seconds or 0.0) / 10, 2 * task.checking)
+        prove = partial(search_in_time, task, Searching(mode, share=0.5), least, "the time limit")
         chosen, outcome = preferred(alike, choose, prove)
     return replace(problem, goal=chosen.goal, weights=chosen.weights), outcome
 
