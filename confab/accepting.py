@@ -11,7 +11,20 @@ from typing import TYPE_CHECKING, NoReturn, Protocol, SupportsIndex, TypeAlias, 
 from confab import ontology
 from confab.interchange import read_plan
 from confab.planner.plan import Plan
+from confab.reasoner.files import STDOUT
 from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
+from confab.reasoner.kinds import (
+    CONVERTED,
+    EPISODE,
+    FILM,
+    GENERATED,
+    IMPORTED,
+    MEMORY,
+    PLAN,
+    REPORT,
+    SAVED,
+    VERDICTS,
+)
 from confab.reasoner.limits import Deadline
 from confab.reasoner.names import nearest
 from confab.reasoner.possible import ImpossibleStateError
@@ -155,6 +168,10 @@ def several(given: Facts) -> list[str]:
         return []
     if isinstance(given, Mapping):
         symbols = [(symbol,) if isinstance(symbol, str) else symbol for symbol in given]
+        for symbol in symbols:
+            if not isinstance(symbol, tuple):
+                wanted = "'cup2 LOCATION' as a key, or texts like 'cup2 LOCATION location8' and 'after=28 cup2 LOCATION location8'"
+                raise KnowledgeError(f"got the key {symbol!r}; wanted {wanted}")
         given = [(*symbol, value) for symbol, value in zip(symbols, given.values(), strict=True)]
     parts = [given] if isinstance(given, str) or not isinstance(given, Iterable) else list(given)
     texts = [" ".join(map(str, part)) if isinstance(part, tuple | list) else part for part in parts]
@@ -221,6 +238,41 @@ def check_seconds(name: str, given: object) -> None:
     number(name, given, "seconds as a number, e.g. 5")
     if isinstance(given, Real) and not float(given) > 0:
         raise KnowledgeError(f"{name}={given}; wanted more than 0 seconds")
+
+
+TURTLE, JSON = ("Turtle", ".ttl"), ("JSON", ".json")
+ENDINGS: Mapping[str, tuple[str, ...]] = {
+    PLAN: JSON,
+    VERDICTS: JSON,
+    EPISODE: ("Turtle or JSON", ".ttl", ".json"),
+    MEMORY: ("Turtle", ".ttl", ""),
+    REPORT: ("HTML", ".html", ".htm"),
+    FILM: ("a film", ".mp4", ".gif"),
+    **dict.fromkeys((GENERATED, SAVED, IMPORTED, CONVERTED), TURTLE),
+}
+"""The form in which content of a kind is written, and the endings of file names for this form."""
+
+
+def named_for(kind: str, given: str | Path) -> Path:
+    """Return the path of a file to write; devices may have any name.
+
+    Raises
+    ------
+    KnowledgeError
+        The ending of the name stands for another form than the form of content of this kind.
+
+    Examples
+    --------
+    >>> named_for("a plan", "plan.pdf")
+    Traceback (most recent call last):
+    confab.reasoner.graph.knowledge.KnowledgeError: plan.pdf: this is written as JSON; wanted a name that ends in .json
+    """
+    path, (form, *endings) = Path(given), ENDINGS.get(kind, ("",))
+    special = path == STDOUT or (path.exists() and not path.is_file())
+    if endings and not special and path.suffix.lower() not in endings:
+        wanted = " or ".join(filter(None, endings))
+        raise KnowledgeError(f"{path}: this is written as {form}; wanted a name that ends in {wanted}")
+    return path
 
 
 def sparql_of(given: str | Path, graph: KnowledgeGraph | None = None) -> str:

@@ -13,14 +13,16 @@ from typing import TYPE_CHECKING, Any
 import pyoxigraph as ox
 
 from confab import ontology
+from confab.accepting import named_for
 from confab.memory import Memory
 from confab.planner.paper.transitions import ground
 from confab.planner.plan import Status
 from confab.planner.solve import Mode
-from confab.reasoner.files import STDOUT, alone, made_folder, write_whole
+from confab.reasoner.files import alone, made_folder, write_whole
 from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.kinds import GENERATED
 from confab.reasoner.memory.experience_file import MemoryLines
-from confab.reasoner.names import local_name, nearest
+from confab.reasoner.names import local_name, nearest, right_arguments
 from confab.reasoner.vocabulary import ARGUMENTS, CORE
 from confab.show import bindings_of
 from confab.table import Table
@@ -42,6 +44,7 @@ WORDS = [CORE + name for name in ("asks", "answer")]
 ROLES = [CORE + name for name in ARGUMENTS]
 
 
+@right_arguments
 def new_domain(name: str, folder: str | Path | None = None, bodies: bool = False) -> list[Path]:
     """Write a valid, commented skeleton of a domain with a scene and a catalog, and return the paths of its files.
 
@@ -84,6 +87,7 @@ def new_domain(name: str, folder: str | Path | None = None, bodies: bool = False
     return list(files)
 
 
+@right_arguments
 def validate(*files: str | Path, deep: bool = False) -> Table:
     """Return a table of the findings in ontology files and their imports, with a remedy for each finding.
 
@@ -101,6 +105,8 @@ def validate(*files: str | Path, deep: bool = False) -> Table:
     """
     from confab.reasoner.validation.validate import validate as check
 
+    if not files:
+        raise KnowledgeError("got no file; wanted validate(FILE, …), where FILE may be the name of a shipped scene")
     for file in files:
         if not isinstance(file, str | Path):
             path = getattr(getattr(file, "knowledge", None), "path", None)
@@ -111,9 +117,10 @@ def validate(*files: str | Path, deep: bool = False) -> Table:
         (f.severity, f"{Path(f.file).name}:{f.line}" if f.line else Path(f.file).name, f.rule, f.what, f.why, f.remedy)
         for f in check(files, deep=deep)
     )
-    return Table(columns, tuple(rows))
+    return Table(columns, tuple(rows), empty="nothing is wrong")
 
 
+@right_arguments
 def generate(
     family: str, path: str | Path | None = None, objects: int = 4, hands: int = 2, clutter: int = 0, seed: int = 0
 ) -> Scene:
@@ -137,16 +144,8 @@ def generate(
             file = Path(folder, f"{family}.ttl")
             write_scene(file, family, objects, hands, clutter, seed)
             return load_text(file.read_bytes())
-    write_scene(turtle_path(path), family, objects, hands, clutter, seed)
+    write_scene(named_for(GENERATED, path), family, objects, hands, clutter, seed)
     return load(path)
-
-
-def turtle_path(given: str | Path) -> Path:
-    """Return the path for a new scene file; raise `KnowledgeError` if its suffix isn't ``.ttl``."""
-    path = Path(given)
-    if path.suffix.lower() != ".ttl" and path != STDOUT:
-        raise KnowledgeError(f"{path}: a scene is written as Turtle; wanted a name that ends in .ttl")
-    return path
 
 
 # ---------------------------------------------------------------------------------------------- comparison of two versions

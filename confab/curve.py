@@ -11,7 +11,7 @@ from confab.planner.plan import Status
 from confab.planner.solve import Mode
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import LimitError
-from confab.reasoner.names import local_name
+from confab.reasoner.names import local_name, right_arguments
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,6 +27,7 @@ MANY = 12
 """Maximum number of episodes for which the picture shows names and counts."""
 
 
+@right_arguments
 def practise(scenes: Scene | Sequence[Scene], memory: Memory, rounds: int = 1, curve: Curve | None = None) -> Curve:
     """Plan in all scenes and learn from the plans, `rounds` times; return the learning curve.
 

@@ -43,6 +43,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "confab query beverage-serving --show B2_PICK",
         "confab query beverage-serving --show B2_PICK --update",
         "confab query beverage-serving --affords cup1",
+        "confab query beverage-serving --facts",
     ),
     "serve": (
         "confab serve beverage-serving",

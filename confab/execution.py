@@ -10,7 +10,18 @@ from pathlib import Path
 from random import Random
 from typing import TYPE_CHECKING, TypedDict
 
-from confab.accepting import AnyPlan, Facts, check_goal, check_noise, check_seconds, number, plan_of, possible, several
+from confab.accepting import (
+    AnyPlan,
+    Facts,
+    check_goal,
+    check_noise,
+    check_seconds,
+    named_for,
+    number,
+    plan_of,
+    possible,
+    several,
+)
 from confab.formats import EpisodeJson
 from confab.interchange import episode_json
 from confab.intervening import parse_interventions
@@ -27,6 +38,7 @@ from confab.planner.validation import open_goals, unmet_goals
 from confab.reasoner.aggregates.totals import exceptions
 from confab.reasoner.amounts import written
 from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.kinds import EPISODE
 from confab.reasoner.limits import within
 from confab.reasoner.memory.links import Links
 from confab.reasoner.names import RightNames, right_names
@@ -166,16 +178,16 @@ class Execution(metaclass=RightNames):
         """
         from confab.reasoner.memory.episodes import save_episode
 
-        if Path(path).suffix == ".json":
+        path = named_for(EPISODE, path)
+        if path.suffix == ".json":
             import json
 
             from confab.reasoner.files import write_whole
 
-            write_whole(Path(path), json.dumps(self.json(), indent=1, ensure_ascii=False) + "\n")
-            return Path(path)
-
-        save_episode(Path(path), self.json(), self.scene.names)
-        return Path(path)
+            write_whole(path, json.dumps(self.json(), indent=1, ensure_ascii=False) + "\n")
+        else:
+            save_episode(path, self.json(), self.scene.names)
+        return path
 
     def __rich__(self) -> PlanTree:
         """Return the executed plan as a tree for rich."""

@@ -63,7 +63,7 @@ OVERVIEW: Mapping[str, str] = {
     "confab.Memory.load(FILE), confab.Memory.of(SCENE); to measure: confab.practise(SCENES, memory); also: advisor, labels, "
     "linked, names, sayings, told",
     "table": "to read: [*table], len(table), table[ROW], columns, rows, values(), truth, count(ROW), index(ROW); to convert: "
-    "records(), dataframe(), csv(), tsv(), turtle(), iris(), standard(FORMAT); to show: print(table); also: terms",
+    "records(), dataframe(), csv(), tsv(), turtle(), iris(), standard(FORMAT); to show: print(table); also: terms, empty",
     "problem": "to read: initial, goal, individuals, classes, relations, domain.behaviors, domain.situations, weights, times, "
     "scene; to ask: members(CLASS), values(SYMBOL, LEVEL), goal_on(LEVEL), at_rest(LEVEL), id_of(BEHAVIOR, ARGUMENTS); also: "
     "domain, first_level, only, parents, sees, value_levels",
@@ -303,9 +303,11 @@ HINTS: Mapping[str, Mapping[str, str]] = {
         "graph": "to_turtle json",
         "execute()": "run apply goto",
         "plan()": "find_path plan_path",
-        "explain()": "why_not whynot",
+        "plan().why(STEP), or explain() for all steps": "why",
+        "plan().why_not(WHAT)": "why_not whynot",
     },
     "result": {
+        "result[WORDS]": "find find_step locate",
         "plan": "best best_plan final_plan first_plan",
         "scene.graph": "rdf triples rdflib turtle to_ttl",
         "solved": "solvable feasible done success succeeded ok found reached finished has_plan valid_plan is_sat well went "
@@ -331,6 +333,7 @@ HINTS: Mapping[str, Mapping[str, str]] = {
         "why(STEP), or explain()": "explanation",
     },
     "plan": {
+        "result[WORDS]": "find find_step get locate",
         "result.purposes": "constraints dependencies ordering causal_links adjacency_list",
         "scene.plan(GOALS) (plans aren't edited)": "replan add update edit change insert replace remove delete extend map "
         "repair concatenate append pop substitute refine splice clear concat merge join plus push unshift set_step",
@@ -487,8 +490,9 @@ COMMANDS = {
     "memory": "experience mem rules memories forget knowledge",
     "report": "html page visualize visualise show view render plot display present gantt print write-report plan-report",
     "runs": "history compare log logs experiments results past mlflow track previous list-runs diff-runs",
-    "query": "ask sparql select facts triples rdf q state get arq objects goals individuals locations where search-graph "
-    "find-facts list-goals",
+    "query": "ask sparql select triples rdf q get arq individuals where search-graph",
+    "query SCENE --facts": "facts state find-facts list-facts objects locations initial-state describe inspect",
+    "query SCENE what-is-wanted": "goals list-goals",
     "query SCENE --affords all": "affordances applicable affords actions possible",
     "query SCENE --show BEHAVIOR": "behaviors behaviours operators skills show-query",
     "serve": "server web ui gui app endpoint dashboard live host http watch browser board open webui edit interactive rviz "
@@ -504,7 +508,7 @@ COMMANDS = {
     "fetch": "download pull install wget update imports get-ontology clone-ontology add-import",
     "import": "load pddl2owl parse upload from-pddl pddl-import",
     "export": "pddl save trajectory dump write export-pddl",
-    "scenes": "list ls examples info describe inspect catalog domains available datasets problems inventory status stat levels "
+    "scenes": "list ls examples info catalog domains available datasets problems inventory status stat levels "
     "worlds envs samples about show-scenes objects-of",
     "--help": "help usage man manual commands docs ?",
     "--version": "version ver",
@@ -597,6 +601,8 @@ NEEDLESS = {
     "scene.with_fact(FACT) returns a scene with another fact": "fact facts",
     "scene.without_goal() returns a scene without goals, to plan for other goals only": "only replace_goals only_goals no_goals "
     "without_goal clear_goals",
+    "confab learn, and memory.learn(EXECUTION), learn from plans and executions": "learn learning train",
+    "the query what-is-wanted lists the goals": "goals list_goals",
     "the same call gives the same result in every process": "seed random_seed random_state rng set_seed",
     "the option -v of a command prints the duration of each stage": "verbose verbosity debug log_level loglevel log "
     "show_progress progress_bar",

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, cast
 
 from confab.reasoner.files import made_folder, write_whole
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.names import local_name, nearest
+from confab.reasoner.names import local_name, nearest, right_arguments
 from confab.table import Table
 
 if TYPE_CHECKING:
@@ -72,6 +72,7 @@ def new_folder(runs: Path) -> Path:
         return folder
 
 
+@right_arguments
 def runs(folder: str | Path) -> list[Run]:
     """Return the runs in a folder in the order of their dates.
 
@@ -106,8 +107,10 @@ def _is_page(page: Mapping[str, object]) -> bool:
     return isinstance(page.get("status"), str) and all(isinstance(page.get(name), list) for name in lists)
 
 
-def listed(those: Sequence[Run]) -> Table:
-    """Return a table with a row for each run and a column for each figure."""
+@right_arguments
+def listed(those: Sequence[Run] | str | Path) -> Table:
+    """Return a table with a row for each run, or each run in a folder, and a column for each figure."""
+    those = runs(those) if isinstance(those, str | Path) else those
     figures = [run.figures() for run in those]
     names = tuple(dict.fromkeys(name for one in figures for name in one))
     rows = tuple(
@@ -117,8 +120,11 @@ def listed(those: Sequence[Run]) -> Table:
     return Table(("run", "scene", "when", *names), rows)
 
 
-def compared(those: Sequence[Run], one: str, other: str) -> Table:
-    """Return a table of the differences between two runs: in figures, in first-level steps, and in final values of goals.
+@right_arguments
+def compared(those: Sequence[Run] | str | Path, one: str, other: str) -> Table:
+    """Return a table of the differences between two runs, in figures, in first-level steps, and in final values of goals.
+
+    `those` are the runs, or the folder that contains them.
 
     Raises
     ------
@@ -141,7 +147,7 @@ def compared(those: Sequence[Run], one: str, other: str) -> Table:
     >>> [row for row in compared(those, "001", "002") if row[0] in ("goal", "primitives")]
     [('primitives', '20', '26'), ('goal', 'cup2 LOCATION location2', 'cup2 LOCATION location8')]
     """
-    by_name = _by_name(those, (one, other))
+    by_name = _by_name(runs(those) if isinstance(those, str | Path) else those, (one, other))
     return Table(("what", one, other), tuple(_differences(by_name[one], by_name[other])))
 
 

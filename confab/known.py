@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeVar, cast, overload
 
 import pyoxigraph as ox
 
-from confab.accepting import Facts, Stated, several, sparql_of
+from confab.accepting import Facts, Stated, named_for, several, sparql_of
 from confab.reasoner.graph.inference import infer
 from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, text
 from confab.reasoner.kinds import SAVED, stamped
@@ -308,9 +308,7 @@ class Known(metaclass=RightNames):
         """
         from confab.reasoner.files import write_whole
 
-        path = Path(path)
-        if path.suffix != ".ttl":
-            raise KnowledgeError(f"{path}: a scene is saved as Turtle; wanted a name that ends in .ttl")
+        path = named_for(SAVED, path)
         self.settle()
         write_whole(path, stamped(SAVED, [self.knowledge.turtle()]))
         return path
@@ -544,7 +542,8 @@ class Known(metaclass=RightNames):
     def __repr__(self) -> str:
         """Return a description of the scene in one line."""
         problem = self.problem
-        return f"Scene({self.iri}: {len(problem.initial)} situated objects, {len(problem.goal)} goals)"
+        counts = f"{len(self.objects)} objects, {len(problem.initial)} facts, {len(problem.goal)} goals"
+        return f"Scene({self.iri}: {counts})"
 
 
 def _is_zero(term: Any) -> bool:

@@ -15,11 +15,12 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, cast
 
-from confab.accepting import AnyPlan, HasPlan, plan_of
+from confab.accepting import AnyPlan, HasPlan, named_for, plan_of
 from confab.planner.paper.learning import learn as learn_plan
 from confab.planner.plan import Plan, Step
 from confab.reasoner.files import alone, has_content, write_whole
 from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.kinds import MEMORY
 from confab.reasoner.memory.experience import (
     ITSELF,
     Experience,
@@ -33,7 +34,7 @@ from confab.reasoner.memory.experience import (
 )
 from confab.reasoner.memory.experience_file import MemoryLines, new_replica, parse, pull, push, turtle
 from confab.reasoner.memory.links import Links
-from confab.reasoner.memory.links_file import links_text, load_links, memory_lines, memory_names
+from confab.reasoner.memory.links_file import links_text, load_links, memory_lines, memory_names, of_another_kind
 from confab.reasoner.names import Names, RightNames, right_names
 from confab.table import Table
 
@@ -148,7 +149,8 @@ class Memory(metaclass=RightNames):
             if ":memoryFormat" in lines.rest or "core#memoryFormat" in lines.rest:
                 found.experience = parse(lines, str(path), names)
             elif not len(found.links):
-                raise KnowledgeError(f"{path}: holds no memory; without it, 'confab learn' makes a new one")
+                why = of_another_kind(path) or "holds no memory; without it, 'confab learn' makes a new one"
+                raise KnowledgeError(f"{path}: {why}")
         found.labels = _labels(scene) if scene is not None else None
         found.trusted.update(found.experience.episodes if trust else found.experience.trusts)
         return found
@@ -314,8 +316,9 @@ class Memory(metaclass=RightNames):
             return Path(target)
         links = [links_text(self.links, self.names, self.scene)] if len(self.links) else []
         lines = chain(turtle(self.experience, self.names, self.scene, words=self.sayings().said), links)
-        write_whole(Path(target), lines, check=self._check_written)
-        return Path(target)
+        path = named_for(MEMORY, target)
+        write_whole(path, lines, check=self._check_written)
+        return path
 
     def _check_written(self, file: Path) -> None:
         """Raise `KnowledgeError` if the content of a file differs from this memory."""

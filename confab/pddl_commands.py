@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from contextlib import suppress
 from pathlib import Path
 from typing import TypeAlias
 
@@ -28,7 +30,7 @@ Ground: TypeAlias = tuple[str, tuple[str, ...]]
 
 
 def import_pddl(domain: Path, problem: Path, out: Path, level: int = 1) -> Problem:
-    """Write a PDDL domain and problem as a scene in Turtle, with all behaviours on one level.
+    """Write a PDDL domain and problem, in either order, as a scene in Turtle, with all behaviours on one level.
 
     Returns
     -------
@@ -41,6 +43,8 @@ def import_pddl(domain: Path, problem: Path, out: Path, level: int = 1) -> Probl
         The PDDL can't be used, or the scene can't be written. The message states the file, the line and the column, if they are
         known.
     """
+    if _states_problem(domain) and not _states_problem(problem):
+        domain, problem = problem, domain
     try:
         pddl = parse_files(domain, problem)
         found = imported(pddl, out.stem, level)
@@ -52,6 +56,16 @@ def import_pddl(domain: Path, problem: Path, out: Path, level: int = 1) -> Probl
     text = turtle(found.problem, title, f"The PDDL problem {pddl.problem} of the domain {pddl.domain}.", found.said)
     write_whole(out, stamped(IMPORTED, [text]), check=_check_turtle)
     return found.problem
+
+
+def _states_problem(file: Path) -> bool:
+    """Return whether a file begins with the definition of a PDDL problem."""
+    with suppress(OSError):
+        return (
+            re.match(r"(\s|;[^\n]*\n)*\(define\s*\(problem\s", file.read_text(errors="replace"), re.IGNORECASE)
+            is not None
+        )
+    return False
 
 
 def _check_turtle(file: Path) -> None:

@@ -9,12 +9,13 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict
 
-from confab.accepting import check_noise, check_seconds, number
+from confab.accepting import check_noise, check_seconds, named_for, number
 from confab.labels import Labels, labels_of
 from confab.planner.plan import Plan
 from confab.progress import progress
 from confab.reasoner.files import check_folder
 from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.kinds import FILM
 from confab.reasoner.limits import within
 from confab.reasoner.names import RightNames, right_names
 from confab.reasoner.symbols import FALSE, Fact, PrimitiveStep, State
@@ -276,9 +277,7 @@ def verify(
     check_seconds("time_limit", time_limit)
     if rollouts < 1 or rollouts != int(rollouts):
         raise KnowledgeError(f"{rollouts} rollouts can't verify a plan; wanted 1 or more")
-    video = None if video is None else Path(video)
-    if video is not None and video.suffix not in (".mp4", ".gif"):
-        raise KnowledgeError(f"{video}: a film is MP4 or GIF; wanted a name that ends in .mp4 or .gif")
+    video = None if video is None else named_for(FILM, video)
     steps = plan.primitives
     require_skills(scene, [step.behavior for step in steps])
     try:

@@ -10,7 +10,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, TypeAlias, cast, overload
 
-from confab.accepting import Facts, check_goal, check_seconds, several
+from confab.accepting import Facts, check_goal, check_seconds, named_for, several
 from confab.checking import refused
 from confab.formats import ResultJson
 from confab.interchange import outcome_json
@@ -21,6 +21,7 @@ from confab.planner.plan import Outcome, Plan, SoftGoal, Status, Step, paused_co
 from confab.planner.solve import DEFAULT_MODE, Mode, Request, solve
 from confab.planner.validation import Fault, unmet_goals, validate
 from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.kinds import PLAN
 from confab.reasoner.limits import Deadline, within
 from confab.reasoner.memory.links import Links
 from confab.reasoner.names import RightNames, right_names
@@ -489,8 +490,9 @@ class Result(metaclass=RightNames):
         """Write the result into a JSON file, and return the path."""
         from confab.reasoner.files import write_whole
 
-        write_whole(Path(path), json.dumps(self.json(), indent=1, ensure_ascii=False) + "\n")
-        return Path(path)
+        path = named_for(PLAN, path)
+        write_whole(path, json.dumps(self.json(), indent=1, ensure_ascii=False) + "\n")
+        return path
 
     def __rich__(self) -> PlanTree | str:
         """Return the plan as a tree for rich; without a plan, return the summary."""

@@ -156,8 +156,11 @@ def _read(path: Path, wanted: str) -> Iterator[Data]:
     except OSError as error:
         raise KnowledgeError(f"{path}: can't be read: {error.strerror}") from error
     except (ValueError, RecursionError) as error:
-        hint = "; scene.with_episodes(FILE) reads Turtle for queries" if path.suffix == ".ttl" else ""
-        raise KnowledgeError(f"{path}: not JSON: {error}{hint}") from error
+        if path.suffix == ".ttl":
+            raise KnowledgeError(
+                f"{path}: is Turtle, which with_episodes reads; wanted JSON: save it as FILE.json"
+            ) from error
+        raise KnowledgeError(f"{path}: not JSON: {error}") from error
     try:
         yield data
     except KnowledgeError:

@@ -424,6 +424,7 @@ def _local(address: str | PathLike[str]) -> str | Path:
     return Path(url2pathname(urlsplit(address).path))
 
 
+@right_arguments
 def scenes() -> list[str]:
     """Return the names of the shipped scenes, which `load` accepts.
 

@@ -70,8 +70,8 @@ class Table(Sequence[tuple[str | None, ...]]):
     """A query result: a sequence of rows with named columns.
 
     `terms` are the same rows with the RDF terms of the store, which have IRIs and datatypes. `truth` is the answer to an ASK
-    query, and None for other queries. In a condition, the table of an ASK query counts as its answer; any other table counts as
-    true if it has a row.
+    query, and None for other queries. `empty` is the text that represents a table without rows. In a condition, the table of an
+    ASK query counts as its answer; any other table counts as true if it has a row.
 
     Examples
     --------
@@ -87,6 +87,7 @@ class Table(Sequence[tuple[str | None, ...]]):
     rows: tuple[tuple[str | None, ...], ...]
     terms: tuple[tuple[Term | None, ...], ...] = ()
     truth: bool | None = None
+    empty: str = ""
 
     @overload
     def __getitem__(self, index: int) -> Row: ...
@@ -187,12 +188,17 @@ class Table(Sequence[tuple[str | None, ...]]):
         """Return the table as a table of rich."""
         from rich.table import Table as RichTable
 
-        table = RichTable(*self.columns)
+        table = RichTable()
+        for at, name in enumerate(self.columns):
+            words = any(" " in (row[at] or "") for row in self.rows)  # other columns have names, which aren't cut
+            table.add_column(name, no_wrap=not words, overflow="fold")
         for row in self.rows:
             table.add_row(*("" if cell is None else cell for cell in row))
         return table
 
     def _repr_html_(self) -> str:
+        if self.empty and not self.rows:
+            return f"<p>{html.escape(self.empty)}</p>"
         left = "style='text-align: left'"
         head = "".join(f"<th {left}>{html.escape(name)}</th>" for name in self.columns)
         body = "".join(
@@ -203,6 +209,8 @@ class Table(Sequence[tuple[str | None, ...]]):
 
     def __repr__(self) -> str:
         """Return the table as text."""
+        if self.empty and not self.rows:
+            return self.empty
         widths = [max(len(cell or "") for cell in column) for column in zip(self.columns, *self.rows, strict=True)]
         lines = [self.columns, *self.rows]
         return "\n".join(

@@ -11,6 +11,8 @@ from fractions import Fraction
 from functools import wraps
 from importlib import import_module
 from inspect import getattr_static, signature
+from numbers import Integral, Real
+from os import PathLike
 from types import FunctionType
 from typing import TYPE_CHECKING, NoReturn, ParamSpec, TypeVar
 
@@ -144,6 +146,36 @@ class RightNames(ABCMeta):
             raise WrongNameError(f"the class of {cls._kind}", name, cls)
 
 
+MADE: dict[str, str] = {}
+"""What an object of a class with `right_names` is, and the call that creates it, by the name of the class."""
+TYPES: Mapping[str, tuple[type, str]] = {
+    "int": (Integral, "a whole number"),
+    "float": (Real, "a number"),
+    "str": (str, "a text"),
+    "Path": (PathLike, "a path"),
+    "None": (type(None), ""),
+}
+"""The types in annotations that `mismatch` compares with arguments, each with its words."""
+
+
+def mismatch(name: str, annotation: str, given: object) -> str:
+    """Return as text that the type of an argument isn't in an annotation; return an empty text if it is, or if this is unknown.
+
+    >>> mismatch("rounds", "int", "x"), mismatch("rounds", "int", 2), mismatch("goals", "Facts", 5)
+    ("got rounds='x'; wanted a whole number", '', '')
+    """
+    parts = annotation.split(" | ")
+    classes = {each.__name__ for each in type(given).__mro__}
+    if not {*parts} <= {*TYPES, *MADE} or any(
+        isinstance(given, TYPES[part][0]) if part in TYPES else part in classes for part in parts
+    ):
+        return ""
+    wanted = " or ".join(filter(None, (TYPES[part][1] if part in TYPES else MADE[part] for part in parts)))
+    use = f", e.g. confab.load({given!r})" if isinstance(given, str) and "confab.load(SCENE)" in wanted else ""
+    shown = repr(given) if isinstance(given, str | int | float) else type(given).__name__
+    return f"got {name}={shown}; wanted {wanted}{use}"
+
+
 def right_names(kind: str, made: str = "") -> Callable[[C], C]:
     """Return a class decorator that adds the correct name to errors for unknown attributes and arguments.
 
@@ -181,11 +213,14 @@ def right_names(kind: str, made: str = "") -> Callable[[C], C]:
                 begin(self, *given, **named)
 
             type.__setattr__(cls, "__init__", made_by)
+            MADE.setdefault(cls.__name__, f"{kind}: {made}")
         for name in dir(cls):
-            function = getattr_static(cls, name)
+            found = getattr_static(cls, name)
+            function = found.__func__ if isinstance(found, classmethod) else found
             own = isinstance(function, FunctionType) and function.__module__.startswith("confab.")
             if own and not name.startswith("_"):
-                setattr(cls, name, right_arguments(function, bound=1))
+                checked_one = right_arguments(function, bound=1)
+                setattr(cls, name, classmethod(checked_one) if isinstance(found, classmethod) else checked_one)
         return cls
 
     return decorated
@@ -250,9 +285,10 @@ def brief(cls: C) -> C:
 
 
 def right_arguments(function: Callable[P, R], bound: int = 0) -> Callable[P, R]:
-    """Return a function whose error for an unknown argument suggests an argument, or lists the arguments.
+    """Return a function whose errors for unknown, missing and wrong arguments state the arguments that it takes.
 
-    The argument ``time_limit`` limits the time of the whole call, including its imports and checks.
+    The error for an unknown argument suggests an argument. If the function fails because of the type of an argument, the error
+    states the wanted type. The argument ``time_limit`` limits the time of the whole call, including its imports and checks.
 
     Parameters
     ----------
@@ -267,6 +303,9 @@ def right_arguments(function: Callable[P, R], bound: int = 0) -> Callable[P, R]:
     if further and not further.startswith("Unpack["):
         return function
     several = [f"*{each.name}" for each in parameters if each.kind is each.VAR_POSITIONAL]
+    names = [each.name for each in parameters]
+    needed = [each.name for each in parameters if each.name in own and each.default is each.empty]
+    shown = ", ".join([*needed, *several, *(f"{each}=" for each in own if each not in needed)])
     most = None if several else sum(each.kind is each.POSITIONAL_OR_KEYWORD for each in parameters)
 
     @wraps(function)
@@ -286,7 +325,25 @@ def right_arguments(function: Callable[P, R], bound: int = 0) -> Callable[P, R]:
                 f"{function.__name__}() takes {', '.join(own[:most]) or 'nothing'} without a name; "
                 f"got {len(given) - bound} values{f' (by name: {named_only})' if named_only else ''}"
             )
-        return function(*given, **named)
+        least = len(given) - bound
+        missing = (
+            [each for at, each in enumerate(names) if each in needed and at >= least and each not in named]
+            if least < len(needed)
+            else ()
+        )
+        if missing:
+            summary = (function.__doc__ or "").split(chr(10))[0]
+            raise TypeError(
+                f"{function.__name__}() lacks {', '.join(missing)}; wanted {function.__name__}({shown}): {summary}"
+            )
+        try:
+            return function(*given, **named)
+        except (TypeError, AttributeError) as error:
+            pairs = {**dict(zip(names, given[bound:], strict=False)), **named}
+            told = (mismatch(one.name, str(one.annotation), pairs[one.name]) for one in parameters if one.name in pairs)
+            if why := next(filter(None, told), ""):
+                raise TypeError(f"{function.__name__}() {why}") from error
+            raise
 
     @wraps(function)
     def limited(*given: P.args, **named: P.kwargs) -> R:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 from click.exceptions import Exit
 
 from confab.commands.given import QUERY as A_QUERY
-from confab.commands.given import load_scene
+from confab.commands.given import TURTLE_EPISODE, load_scene
 from confab.commands.options import (
     AS_JSON,
     PATH,
@@ -29,11 +28,8 @@ from confab.examples import examples
 from confab.progress import progress
 from confab.reasoner.files import STDOUT
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.kinds import EPISODE
+from confab.table import Table
 from confab.terminal import NO, YES, limited, show_result, told
-
-if TYPE_CHECKING:
-    from confab.table import Table
 
 
 @command(epilog=examples("serve"))
@@ -89,7 +85,11 @@ FORMS = {
     help="SPARQL text, a .rq file, a shipped query (where-was-it), or - for stdin.",
 )
 @click.option(
-    "--episodes", multiple=True, type=Input(EPISODE), metavar="FILE", help="Also query this saved episode; repeatable."
+    "--episodes",
+    multiple=True,
+    type=Input(TURTLE_EPISODE),
+    metavar="FILE.ttl",
+    help="Also query this saved episode; repeatable.",
 )
 @click.option("--show", metavar="BEHAVIOR", help="Print the query that quantifies this behaviour.")
 @click.option(
@@ -97,6 +97,9 @@ FORMS = {
 )
 @click.option("--update", is_flag=True, help="With --show: the behaviour as a SPARQL update.")
 @click.option("--affords", metavar="OBJECT", help="List the behaviours that an object affords; 'all' for every object.")
+@click.option(
+    "--facts", is_flag=True, help="List all initial facts, also default and derived ones, as --fact takes them."
+)
 @click.option("--format", "form", help="Format: table, csv, json, tsv, sparql-json or sparql-xml.")
 @click.option("--iris", is_flag=True, help="Print full IRIs instead of short names.")
 @click.option(
@@ -121,6 +124,7 @@ def query(
     applicable: bool,
     update: bool,
     affords: str | None,
+    facts: bool,
     form: str | None,
     iris: bool,
     out: Path | None,
@@ -130,13 +134,13 @@ def query(
     iri: str | None,
     as_json: bool,
 ) -> None:
-    """Query a scene in SPARQL, or list its affordances."""
+    """Query a scene in SPARQL, or list its facts or affordances."""
     from confab.reasoner.graph.query_process import QueryLimits
 
     limits = QueryLimits(seconds=time_limit, rows=rows, service=service)
     if sparql == "-":
         sparql = sys.stdin.read()
-    asked = {"QUERY": sparql, "--show": show, "--affords": affords}
+    asked = {"QUERY": sparql, "--show": show, "--affords": affords, "--facts": facts or None}
     given = [name for name, value in asked.items() if value is not None]
     if len(given) > 1:
         raise KnowledgeError(f"{' and '.join(given)} exclude each other; give one")
@@ -154,12 +158,13 @@ def query(
         if show is not None:
             print(loaded.applicable_query(show) if applicable else loaded.quantifying_query(show))
             return
-        if sparql is None and affords is None:
+        if not given:
             from confab.accepting import shipped_queries
 
             shipped = ", ".join(shipped_queries(loaded.knowledge))
             raise KnowledgeError(
-                f"no query; give SPARQL text, a .rq file, a shipped query ({shipped}), --show BEHAVIOR or --affords OBJECT"
+                f"no query; give SPARQL text, a .rq file, a shipped query ({shipped}), --facts, --show BEHAVIOR "
+                "or --affords OBJECT"
             )
         if out is not None and out.suffix.lower() == ".ttl":
             if sparql is None:
@@ -167,7 +172,10 @@ def query(
             told(out, f"{loaded.construct(sparql, out, limits)} triples")
             return
         with progress("asking"):
-            table = loaded.affordances(affords) if sparql is None else loaded.query(sparql, limits)
+            if facts:
+                table = Table(("fact",), tuple((fact,) for fact in loaded.facts))
+            else:
+                table = loaded.affordances(affords) if sparql is None else loaded.query(sparql, limits)
     form = form or ("json" if as_json else FORMS.get(out.suffix.lower()) if out not in (None, STDOUT) else "table")
     if form is None or form not in FORMS.values():
         wanted = f"wanted a file in {', '.join(FORMS)}" if form is None else f"wanted {', '.join(FORMS.values())}"

@@ -152,10 +152,9 @@ def _validated(files: tuple[str, ...], deep: bool, strict: bool, time_limit: flo
 @SEED
 def generate(family: str, out: Path, objects: int, hands: int, clutter: int, seed: int) -> None:
     """Generate a scene for trials as an ordinary ontology file."""
-    from confab.authoring import turtle_path
     from confab.reasoner.generate import write_scene
 
-    write_scene(turtle_path(out), family, objects, hands, clutter, seed)
+    write_scene(out, family, objects, hands, clutter, seed)
     told(out, f"a scene of the family {family}; plan in it with: confab plan {quote(str(out))}")
 
 
@@ -165,7 +164,7 @@ def generate(family: str, out: Path, objects: int, hands: int, clutter: int, see
     "--behaviors",
     "form",
     type=click.Choice(["sparql", "individuals"]),
-    required=True,
+    default="sparql",
     help="Write each behaviour as one SPARQL update, or its conditions and effects as individuals.",
 )
 @click.option(
@@ -178,7 +177,6 @@ def generate(family: str, out: Path, objects: int, hands: int, clutter: int, see
 )
 def convert(file: Path, form: str, out: Path | None) -> None:
     """Write the behaviours of a file in another form."""
-    from confab.authoring import turtle_path
     from confab.reasoner.updates.converting import convert as converted
 
     found = converted(file, "sparql" if form == "sparql" else "individuals")
@@ -188,15 +186,21 @@ def convert(file: Path, form: str, out: Path | None) -> None:
         from confab.reasoner.files import write_whole
         from confab.reasoner.kinds import stamped
 
-        write_whole(turtle_path(out), stamped(CONVERTED, [found.text]))
+        write_whole(out, stamped(CONVERTED, [found.text]))
         told(out, f"{len(found.behaviors)} behaviours written as {'updates' if form == 'sparql' else 'individuals'}")
     for note in found.notes:
         remark(note)
 
 
 @command("import", epilog=examples("import"))
-@click.argument("source", type=Text(PDDL), metavar="DOMAIN.pddl|WORLD.yaml")
-@click.argument("problem", type=Input(PDDL), required=False, metavar="[PROBLEM.pddl]")
+@click.argument("source", type=Text(PDDL), metavar="FILE.pddl|WORLD.yaml")
+@click.argument(
+    "problem",
+    type=Input(PDDL),
+    required=False,
+    metavar="[OTHER.pddl]",
+    help="The problem for a PDDL domain, or the domain for a PDDL problem.",
+)
 @click.option("-o", "--output", "out", type=Output(IMPORTED), required=True, metavar="SCENE.ttl", help="File to write.")
 @click.option(
     "--level",
@@ -215,24 +219,22 @@ def import_(
 
     A robot's world model is given as INTERFACE:ADDRESS, or as a world file.
     """
-    from confab.authoring import turtle_path
     from confab.reasoner.graph.knowledge import KnowledgeError
 
     if problem is None and source.endswith(".pddl"):
         raise KnowledgeError(
-            f"{source} is a domain or a problem alone; give both: confab import DOMAIN.pddl PROBLEM.pddl"
+            f"{source} is a domain or a problem alone; give both: confab import DOMAIN.pddl PROBLEM.pddl -o SCENE.ttl"
         )
     with limited(time_limit):
         if problem is None:
             from confab.world_import import scene_of_graph, scene_of_world
 
-            path = turtle_path(out)
-            count = scene_of_world(source, path) if query is None else scene_of_graph(Path(source), query, path)
+            count = scene_of_world(source, out) if query is None else scene_of_graph(Path(source), query, out)
             print(f"{out}: {count} individuals; plan in it with: confab plan {quote(str(out))} --goal FACT")
             return
         from confab.pddl_commands import import_pddl
 
-        imported = import_pddl(Path(source), problem, turtle_path(out), level)
+        imported = import_pddl(Path(source), problem, out, level)
     behaviors, facts = len(imported.domain.behaviors), len(imported.initial)
     told(out, f"{behaviors} behaviours, {facts} facts; plan in it with: confab plan {quote(str(out))}")
 

@@ -12,12 +12,12 @@ import click
 
 from confab import ontology
 from confab.progress import progress
-from confab.reasoner.files import STDOUT
 from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.kinds import MEMORY
 from confab.terminal import remark
 
 SCENE, PDDL, QUERY, FACT, INTERVENTION, NUMBER = "a scene", "PDDL", "a query", "a fact", "an intervention", "a number"
-IRI = "an IRI"
+IRI, TURTLE_EPISODE = "an IRI", "an episode in Turtle"
 """The kinds of values that arguments and options take, beside the kinds of files in `confab.reasoner.kinds`."""
 
 if TYPE_CHECKING:
@@ -105,17 +105,14 @@ def memory_for(path: Path | None, none: bool, scene: Scene, new: bool = False) -
                 remark(f"{path} has terms that this scene doesn't have: {'; '.join(unknown[:NAMED])}{more}")
         return Memory.load(path, scene, lines=lines)
     except KnowledgeError as error:
+        from confab.commands.misplaced import kind_of_value
+
         if not path.is_file():
             raise
+        if kind_of_value(str(path)) not in ("", MEMORY):
+            raise KnowledgeError("wanted a memory") from error
         remark(f"{error}; planning continues without memory")
         return None
-
-
-def json_file(path: Path) -> Path:
-    """Return the path of an output file for a plan or verdicts; raise `KnowledgeError` if its suffix isn't ``.json``."""
-    if path.suffix.lower() != ".json" and path != STDOUT:
-        raise KnowledgeError(f"{path}: is written as JSON; wanted a name that ends in .json")
-    return path
 
 
 def plan_in(path: Path, scene: Scene) -> Plan:

@@ -17,7 +17,7 @@ from shlex import quote
 import click
 
 from confab import ontology
-from confab.commands.given import FACT, INTERVENTION, NUMBER, PDDL, QUERY, SCENE
+from confab.commands.given import FACT, INTERVENTION, NUMBER, PDDL, QUERY, SCENE, TURTLE_EPISODE
 from confab.reasoner.kinds import EPISODE, FILM, MEMORY, OBSERVED, PICTURE, PLAN, REPORT, VERDICTS, kind_of
 
 OF_FILES = {PDDL: "PDDL", SCENE: "scene|ontology|XML document"} | {
@@ -25,7 +25,7 @@ OF_FILES = {PDDL: "PDDL", SCENE: "scene|ontology|XML document"} | {
 }
 """The kinds of files, each with a pattern of its name in `confab.reasoner.kinds`."""
 OF_TEXTS = {
-    QUERY: r"(?i)\s*(SELECT|ASK|CONSTRUCT|DESCRIBE|PREFIX)\b.*",
+    QUERY: r"(?i)\s*(SELECT|ASK|CONSTRUCT|DESCRIBE|PREFIX)\b\s*\S.*",
     INTERVENTION: r"(after|at)=\S+ .*",
     NUMBER: r"\d+",
     FACT: r"\S+ [A-Z]\w*( \S+)*",
@@ -57,6 +57,8 @@ def kind_of_value(value: str) -> str:
 def _kind_of_file(path: Path, changed: int) -> str:
     """Return the kind of a file that was changed at a time; empty for other kinds of files."""
     found = kind_of(path)
+    if found and found.name == EPISODE and path.suffix == ".ttl":
+        return TURTLE_EPISODE
     return next((kind for kind, name in OF_FILES.items() if found and re.search(name, found.name)), "")
 
 
@@ -143,7 +145,9 @@ def line(path: str, command: click.Command, context: click.Context, placed: Plac
     words = [path]
     for argument in (each for each in command.params if isinstance(each, click.Argument)):
         values = [quote(value) for each, value in placed if each is argument and value is not None]
-        words += values or [argument.metavar or ""] * argument.required
+        both = taken(argument) and any(value and kind_of_value(value) == taken(argument) for _, value in placed)
+        wanted = bool(argument.required or both)
+        words += values or [(argument.metavar or "").strip("[]")] * wanted
     given = [(each, value) for each, value in placed if isinstance(each, click.Option)]
     for option, value in given:
         words += [option.opts[0], *([] if value is None else [quote(value)])]

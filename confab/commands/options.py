@@ -68,8 +68,10 @@ class Output(click.Path):
         if path == STDOUT and self.kind not in TEXTS:
             self.fail(f"{self.kind or 'this'} can't be written to stdout; wanted the name of a file", param, ctx)
         if self.kind and ctx is not None and not ctx.resilient_parsing:
+            from confab.accepting import named_for
             from confab.reasoner.files import check_folder, check_replaceable
 
+            named_for(self.kind, path)
             if path != STDOUT:
                 check_folder(path)
             check_replaceable(path, self.kind)
@@ -132,7 +134,7 @@ class Command(click.Command):
 
 GIVEN = "confab.given"
 """The index of the words of the command line in `click.Context.meta`."""
-SHORT = 80
+SHORT = 100
 """Maximum length of an error about a value that precedes the correct command line; longer ones are left out."""
 
 

@@ -14,7 +14,6 @@ from confab.commands.given import (
     FACT,
     INTERVENTION,
     blame_reach,
-    json_file,
     load_scene,
     memory_for,
     plan_in,
@@ -119,8 +118,6 @@ def plan(
     from confab.planning import plan_by
     from confab.show import summary
 
-    if out is not None:
-        json_file(out)
     free = leaves_levels(levels)
     with limited(time_limit) as deadline:
         loaded = load_scene(scene, iri)
@@ -249,8 +246,6 @@ def verify(
     from confab.physics import counted
     from confab.refuting import keep, refuted_in
 
-    if out is not None:
-        json_file(out)
     with limited(time_limit), counted(rollouts) as done:
         loaded = load_scene(scene)
         loaded = loaded.with_goal(*goal) if goal else loaded

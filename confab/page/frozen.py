@@ -8,9 +8,10 @@ from html import escape
 from pathlib import Path
 from string import Template
 
+from confab.accepting import named_for
 from confab.page.markup import asset, script
 from confab.page.schema import PageData
-from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.kinds import REPORT
 
 
 def page_html(data: Mapping[str, object] | PageData | None, title: str) -> str:
@@ -31,7 +32,6 @@ def write_page(path: str | Path, data: PageData) -> Path:
     """
     from confab.reasoner.files import write_whole
 
-    if Path(path).suffix.lower() not in ("", ".html", ".htm", ".xhtml"):
-        raise KnowledgeError(f"{path}: a page is HTML; wanted a name that ends in .html")
-    write_whole(Path(path), page_html(data, data["title"]))
-    return Path(path)
+    path = named_for(REPORT, path)
+    write_whole(path, page_html(data, data["title"]))
+    return path

@@ -14,6 +14,7 @@ from urllib.parse import quote
 
 import pyoxigraph as ox
 
+from confab.reasoner import kinds
 from confab.reasoner.graph.knowledge import BASE, KnowledgeError, KnowledgeGraph, text
 from confab.reasoner.memory.experience_file import MemoryLines, lines, no_such_file
 from confab.reasoner.memory.links import Links
@@ -129,8 +130,19 @@ def _graph(path: Path, found: MemoryLines | None = None) -> KnowledgeGraph:
         triples = ox.parse(rest, format=ox.RdfFormat.TURTLE, base_iri=path.resolve().as_uri())
         graph.store.extend(ox.Quad(q.subject, q.predicate, q.object, target) for q in triples)
     except SyntaxError as error:
-        raise KnowledgeError(f"{path}: broken memory: {error}; plan with memory=None, or restore a copy") from error
+        why = of_another_kind(path) or f"broken memory: {error}; plan with memory=None, or restore a copy"
+        raise KnowledgeError(f"{path}: {why}") from error
     return graph
+
+
+def of_another_kind(path: Path) -> str:
+    """Return as text that a file has a known kind of content other than a memory; otherwise, return an empty text."""
+    kind = kinds.kind_of(path)
+    return (
+        ""
+        if kind is None or kind.name in (kinds.MEMORY, "a text")
+        else f"is {kind}; wanted a memory, which 'confab learn' makes"
+    )
 
 
 def _triples(links: Links, names: Names, iri: str) -> Iterator[ox.Triple]:

@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any, cast
 
 import pytest
 import rdflib
@@ -17,6 +18,7 @@ import rdflib
 import confab
 from confab import ontology
 from confab.authoring import new_domain
+from confab.history import compared
 from confab.reasoner.graph.knowledge import KnowledgeError
 
 SCENE = "beverage-serving-moved"
@@ -137,6 +139,32 @@ SAID: dict[str, tuple[Callable[[confab.Scene, confab.Result], object], str]] = {
     "PDDL in a folder": (lambda scene, result: scene.to_pddl("out"), "scene.export(FOLDER)"),  # type: ignore[arg-type]
     "a wrong column": (lambda scene, result: scene.query("SELECT ?o { ?o k:location ?l }")["ob"], "columns: o"),
 }
+
+
+PACKAGE, COMPARED = cast("Any", confab), cast("Any", compared)
+WRONG_CALLS: dict[str, Callable[[Any], object]] = {
+    "query() lacks sparql; wanted query(sparql, limits=): Return the result": lambda scene: scene.query(),
+    "generate() lacks family; wanted generate(family, path=": lambda scene: PACKAGE.generate(),
+    "generate() takes no 'n'; did you mean 'objects'?": lambda scene: PACKAGE.generate(n=5),
+    "generate() got objects='x'; wanted a whole number": lambda scene: PACKAGE.generate("served", objects="x"),
+    "practise() lacks memory; wanted practise(scenes, memory": lambda scene: PACKAGE.practise(scene),
+    "of() got scene='two-cups'; wanted a scene: confab.load(SCENE), e.g. confab.load('two-cups')": (
+        lambda scene: PACKAGE.Memory.of("two-cups")
+    ),
+    "compared() lacks other; wanted compared(those, one, other)": lambda scene: COMPARED("001", "002"),
+    "got no file; wanted validate(FILE": lambda scene: confab.validate(),
+    "got the key 28; wanted 'cup2 LOCATION' as a key": lambda scene: scene.execute(interventions={28: "x"}),
+    "plan.pdf: this is written as JSON; wanted a name that ends in .json": lambda scene: scene.plan().save("plan.pdf"),
+    "run.txt: this is written as Turtle or JSON": lambda scene: scene.execute().save("run.txt"),
+}
+"""Calls with missing or wrong arguments, by the beginning of the answer."""
+
+
+@pytest.mark.parametrize("said", WRONG_CALLS)
+def test_a_call_with_missing_or_wrong_arguments_says_what_it_got_and_what_it_wants(said: str) -> None:
+    with pytest.raises((TypeError, KnowledgeError)) as error:
+        WRONG_CALLS[said](confab.load("two-cups"))
+    assert str(error.value).startswith(said)
 
 
 @pytest.mark.parametrize("call", LATER.values(), ids=LATER)
@@ -275,7 +303,7 @@ def test_writing_a_file_creates_no_missing_parent_folder(
         with pytest.raises(OSError, match=r"there is no folder '.*typo'; create it, or give another name"):
             write(missing / name)
     assert not missing.parent.exists()
-    with pytest.raises(KnowledgeError, match=r"a page is HTML; wanted a name that ends in \.html"):
+    with pytest.raises(KnowledgeError, match=r"this is written as HTML; wanted a name that ends in \.html"):
         result.report(tmp_path / "p.pdf")
 
 

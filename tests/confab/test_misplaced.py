@@ -24,6 +24,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     result.save(folder / "plan.json")
     memory.save(folder / "memory.ttl")
     scene.execute(result).save(folder / "episode.json")
+    scene.execute(result).save(folder / "episode.ttl")
     result.report(folder / "page.html")
     scene.export(folder / "pddl")
     scene.save(folder / "scene.ttl")
@@ -46,6 +47,13 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (["plan", SCENE, "new.json"], f"use: confab plan {SCENE} -o new.json"),
         (["plan", "memory.ttl"], "memory.ttl is a memory; use: confab plan SCENE --memory memory.ttl"),
         (["plan", "plan.json"], "use: confab verify SCENE plan.json | confab execute SCENE --plan plan.json | "),
+        (["plan", "pddl/domain.pddl"], "use: confab import pddl/domain.pddl OTHER.pddl -o SCENE.ttl"),
+        (["plan", SCENE, "--memory", "plan.json"], "wanted a memory; plan.json is a plan; use: confab verify SCENE"),
+        (
+            ["learn", SCENE, "-o", "m.ttl", "--episode", "episode.ttl"],
+            "wanted JSON: save it as FILE.json; episode.ttl is an",
+        ),
+        (["ask", SCENE], "no such command 'ask'; did you mean 'query'?"),
         (["plan", "pddl/domain.pddl", "pddl/problem.pddl"], "use: confab import pddl/domain.pddl pddl/problem.pddl -o"),
         (["run", SCENE, "memory.ttl"], f"use: confab run {SCENE} --memory memory.ttl"),
         (["run", "plan.json"], "plan.json is a plan; use: confab verify SCENE plan.json | "),
@@ -101,6 +109,21 @@ def test_a_memory_file_without_a_command_is_shown_and_learn_writes_its_output_as
         with pytest.raises(SystemExit, match="0"):
             main(line)
         assert "rules" in capsys.readouterr().out
+
+
+def test_pddl_is_imported_in_either_order(files: Path, tmp_path: Path) -> None:
+    for name, order in {"one": ("domain", "problem"), "other": ("problem", "domain")}.items():
+        with pytest.raises(SystemExit, match="0"):
+            main(
+                [
+                    "import",
+                    *(str(files / "pddl" / f"{each}.pddl") for each in order),
+                    "-o",
+                    str(tmp_path / f"{name}.ttl"),
+                ]
+            )
+    one, other = (confab.load(tmp_path / f"{name}.ttl") for name in ("one", "other"))
+    assert one.facts == other.facts
 
 
 def test_verify_without_a_plan_makes_a_plan_and_report_shows_a_given_plan(

@@ -73,6 +73,16 @@ def test_a_data_frame_has_types(scene: confab.Scene) -> None:
     assert frame.below.sum() > 5
 
 
+def test_the_command_line_lists_all_facts_of_a_domain_of_its_own_with_default_values(
+    run: CliRunner, tmp_path: Path
+) -> None:
+    confab.new_domain("tearoom", tmp_path)
+    shown = run.invoke(app, ["query", str(tmp_path / "tearoom-scene.ttl"), "--facts", "--fact", "plate2 PLACE sink"])
+    assert shown.stdout.splitlines() == [
+        "fact", "plate1 CLEANLINESS dirty", "plate1 PLACE table", "plate2 CLEANLINESS clean", "plate2 PLACE sink"
+    ]  # fmt: skip
+
+
 def test_answers_have_iris_on_request(scene: confab.Scene, run: CliRunner, tmp_path: Path) -> None:
     table = scene.query("SELECT ?o ?n WHERE { ?o a k:Cup ; :index ?n } ORDER BY ?o")
     assert table.iris()[0] == (CUP1, "3")
