@@ -13,7 +13,6 @@ import click
 from confab import ontology
 from confab.progress import progress
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.kinds import MEMORY
 from confab.terminal import remark
 
 SCENE, PDDL, QUERY, FACT, INTERVENTION, NUMBER = "a scene", "PDDL", "a query", "a fact", "an intervention", "a number"
@@ -105,11 +104,11 @@ def memory_for(path: Path | None, none: bool, scene: Scene, new: bool = False) -
                 remark(f"{path} has terms that this scene doesn't have: {'; '.join(unknown[:NAMED])}{more}")
         return Memory.load(path, scene, lines=lines)
     except KnowledgeError as error:
-        from confab.commands.misplaced import kind_of_value
+        from confab.reasoner.memory.links_file import of_another_kind
 
         if not path.is_file():
             raise
-        if kind_of_value(str(path)) not in ("", MEMORY):
+        if of_another_kind(path):
             raise KnowledgeError("wanted a memory") from error
         remark(f"{error}; planning continues without memory")
         return None
