@@ -127,7 +127,7 @@ class SymbolicWorld:
                     report(number, begin, _interrupted(course.steps[number]))
                 running = sorted(one for one in running if one[1] not in stopped)
                 continue
-            now = min(times)
+            now = dispatch.misses(now, min(times)) or min(times)
             self.seconds = float(start + now)
             while running and running[0][0] == now:
                 _, number, begin = heappop(running)

@@ -14,12 +14,10 @@ constraint networks", Journal of Experimental and Theoretical Artificial Intelli
 from __future__ import annotations
 
 import heapq
-from bisect import bisect_left
 from collections import defaultdict
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import partial
 from math import ceil, floor, inf
 
 from confab.planner.plan import Step
@@ -110,14 +108,10 @@ class Dispatch:
         return [i for i in self.waiting if self._possible(i, time, safe) <= time]
 
     def wakes(self, now: Fraction) -> Fraction | None:
-        """Return the next time at which the caller acts even if no primitive ends before that time, or None.
-
-        At this time, a primitive can begin, or it becomes certain that a goal misses its deadline.
-        """
+        """Return the next time at which the caller acts even if no primitive ends before that time, or None."""
         time = self._units(now)
         safe = self._safe(time)
         later = [at for i in self.waiting if time < (at := self._possible(i, time, safe)) < inf]
-        later += self._misses(time)
         return int(min(later)) * self.network.unit if later else None
 
     @property
@@ -152,6 +146,22 @@ class Dispatch:
                 ]
         return found
 
+    def misses(self, now: Fraction, before: Fraction) -> Fraction | None:
+        """Return the first time between two times at which it becomes certain that a deadline is missed, or None.
+
+        Until the second time, no primitive begins or ends.
+        """
+        if not self.order.latest:
+            return None
+        low, high = self._units(now), self._units(before)
+        lasts, begins = self._expected(high, -self.spread)
+        found = []
+        for (i, which), by in self.order.latest.items():
+            late_by = begins.begins[i] + (lasts[i] if which == END else 0) - floor(by / self.network.unit)
+            if late_by > 0 and low < (at := high - late_by + 1) < high:
+                found.append(at)
+        return min(found) * self.network.unit if found else None
+
     def timed(self, now: Fraction) -> TimedPlan | None:
         """Return the plan with the times of the begins and ends so far, and with the expected times of the others.
 
@@ -159,21 +169,6 @@ class Dispatch:
         """
         lasts, begins = self._expected(self._units(now))
         return self._plan(CandidateSchedule(self.turns, begins), lasts)
-
-    def _misses(self, time: int) -> Iterator[int]:
-        """Yield the later times at which it becomes certain that a deadline is missed, if no primitive ends before."""
-        latest = {
-            key: floor(by / self.network.unit) for key, by in self.order.latest.items() if key[0] not in self.over
-        }
-
-        def certain(key: tuple[int, int], at: int) -> bool:
-            lasts, begins = self._expected(at, -self.spread)
-            return begins.begins[key[0]] + (lasts[key[0]] if key[1] == END else 0) > latest[key]
-
-        for key, by in latest.items():
-            times = range(time + 1, by + 2)
-            if times and not certain(key, time) and certain(key, times[-1]):
-                yield times[bisect_left(times, True, key=partial(certain, key))]
 
     # ------------------------------------------------------------------------------------------------------ conditions
 
@@ -370,7 +365,7 @@ def simulated(dispatch: Dispatch, actual: Callable[[int, Fraction], Fraction]) -
         times += [at] if (at := dispatch.wakes(now)) is not None else []
         if not times:
             break
-        now = min(times)
+        now = dispatch.misses(now, min(times)) or min(times)
         while running and running[0][0] == now:
             dispatch.end(heapq.heappop(running)[1], now)
     slots = tuple(Slot(dispatch.step(i), *begins[i]) for i in sorted(begins))
