@@ -67,12 +67,12 @@ def scheduled(
 
     If no schedule meets the deadlines and windows of the task, the outcome's status becomes "gave up".
     """
+    if outcome.plan is None:
+        return outcome, None
     from confab.planner.levels import levels_left
     from confab.planner.plan_costs import cost_of
     from confab.planner.timed.call import best_in_time
 
-    if outcome.plan is None:
-        return outcome, None
     timed = best_in_time(problem, outcome.plan, deadline.left, shorten)
     if timed.plan is None:
         return replace(outcome, status=Status.GAVE_UP, plan=None, reason=timed.reason, left=(), cost=None), None
