@@ -43,7 +43,7 @@ from confab.reasoner.limits import within
 from confab.reasoner.memory.links import Links
 from confab.reasoner.names import RightNames, right_names
 from confab.reasoner.possible import violated
-from confab.reasoner.reading.goals import with_goals
+from confab.reasoner.reading.goals import some_of, with_goals
 from confab.reasoner.symbols import Fact, Problem, Symbol
 from confab.timing import has_times
 
@@ -161,8 +161,13 @@ class Execution(metaclass=RightNames):
         text += "".join(f"; seen: {found.text}" for found, _ in episode.discovered if found.text)
         text += "".join(f"; {violation}" for violation in self.violations)
         text += "".join(f"; {reason.text}" for reason in episode.reasons)
+        if not episode.missed:
+            return text
         missed = ", ".join(intervention.text for intervention in episode.missed)
-        return text + (f"; the step or time of an intervention wasn't reached: {missed}" if episode.missed else "")
+        by_id = any(isinstance(intervention.after, int) for intervention in episode.missed)
+        ids = some_of([*dict.fromkeys(str(step.id) for step in episode.planned.steps)])
+        said = f" (after=ID names a step of the first level: {ids})" if by_id and ids else ""
+        return f"{text}; the step or time of an intervention wasn't reached: {missed}{said}"
 
     def graph(self) -> networkx.DiGraph[int]:
         """Return the partial order of the executed primitives. An edge leads from a primitive to a primitive that depends on it."""

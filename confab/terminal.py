@@ -202,7 +202,7 @@ def _log(error: BaseException) -> str:
 
 
 PARAMETER = re.compile(
-    r"(?<![\w'])(?P<name>engine|gui|memory|minimise|mode|optimal|port|scene|time_limit|video)=(?P<value>None|True|'\w[\w-]*'|)"
+    r"(?<![\w'])(?P<name>classes|engine|gui|memory|minimise|mode|optimal|port|scene|time_limit|video)=(?P<value>None|True|'\w[\w-]*'|)"
     r"(?=[\s),;.]|$)"
 )
 """Pattern of a Python parameter, perhaps with a value, that also exists as an option of the command line."""

@@ -49,9 +49,9 @@ def with_changes(scene: Scene) -> Scene:
 
 
 def warn_of_errors(scene: Scene, deadline: Deadline) -> None:
-    """Print the first error that a quick validation finds in a scene file of the user; do nothing if no time is left."""
+    """Print the first error that a quick validation finds in an unchanged scene file of the user, if time is left."""
     path = scene.knowledge.path
-    if path is None or path.is_relative_to(ontology.ROOT) or deadline.left == 0:
+    if path is None or path.is_relative_to(ontology.ROOT) or deadline.left == 0 or scene.knowledge.changes:
         return
     from confab.reasoner.limits import LimitError, within
     from confab.reasoner.validation.validate import quick_errors

@@ -58,7 +58,8 @@ def test_interventions_whose_step_or_time_never_came_are_reported() -> None:
     assert execution.reached
     assert execution.json()["never_came"] == never
     assert execution.summary().endswith(
-        "the step or time of an intervention wasn't reached: after=999 remove cup2, at=9999 remove cup2"
+        "the step or time of an intervention wasn't reached: after=999 remove cup2, at=9999 remove cup2 "
+        "(after=ID names a step of the first level: 22, 28, 34, 39)"
     )
 
 
