@@ -229,7 +229,7 @@ def _table(scene: Known, path: Path) -> Path:
 
     if not scene.embodiment.places:
         raise KnowledgeError(
-            f"{scene.iri} has no places with coordinates, so there is no table to show; draw its classes (classes=True) or a behaviour"
+            f"{scene.iri} has no places with coordinates, so there is no table; draw its classes (classes=True) or a behaviour"
         )
     scene = with_reach(scene)
     reached = scene.problem.relations.get(local_name(reach_relation(scene.knowledge)), frozenset())
