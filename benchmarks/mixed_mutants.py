@@ -93,8 +93,8 @@ class Traced:
 
 def kills(many: int, into: Path, chosen: Sequence[str] = ()) -> None:
     """Try `many` faults in each part, or in the chosen parts, and print the share of detected faults."""
-    for name in LIBRARIES:
-        import_module(name)
+    for name in (*LIBRARIES, *(Instead(file, "").name for files in PARTS.values() for file in files)):
+        import_module(name)  # `functions` finds only the functions of modules that are imported
     into.mkdir(parents=True, exist_ok=True)
     record = into / "mixed-mutants.json"
     known: dict[str, Record] = json.loads(record.read_text("utf-8")) if record.is_file() else {}

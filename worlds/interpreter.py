@@ -394,7 +394,7 @@ class Interpreter:
         assert quantity is not None
         said = [
             f"{amount} == {amount}",
-            f"abs({amount}) <= {LARGEST}",
+            f"abs({amount}.numerator) <= {LARGEST}",
             f"(type({amount}) is int or {amount}.denominator <= {LARGEST})",
         ]
         said += [f"{amount} >= {number(quantity.least)!r}"] if quantity.least is not None else []

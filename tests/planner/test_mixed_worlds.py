@@ -117,6 +117,14 @@ def test_costs_that_depend_on_amounts_and_soft_goals_give_no_wrong_bound(mode: s
 
 
 @pytest.mark.usefixtures("unlimited_judge")
+@pytest.mark.parametrize("seed", [7_210_018, 7_210_329])
+def test_several_effects_of_a_behaviour_on_one_amount_add_up(seed: int, tmp_path: Path) -> None:
+    shares = {"constrained": 0.3, "mutual": 0.2, "priced": 0.2, "everyone": 0.2, "repeated": 1.0}
+    world, meant = drawn(seed, **shares)
+    assert not Judge(world, tmp_path, meant=meant).judged().complaints
+
+
+@pytest.mark.usefixtures("unlimited_judge")
 def test_the_part_that_recognition_selects_has_the_same_costs_and_names_as_the_whole_world(tmp_path: Path) -> None:
     for seed in range(8_400_000, 8_400_006):
         world, meant = drawn(seed, constrained=0.3)
