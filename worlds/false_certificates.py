@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
+from fractions import Fraction
+from itertools import product
 from random import Random
 
 from confab.planner.certificate_checks import is_bounded, refusal
@@ -73,25 +76,33 @@ def corrupted(problem: Problem, certificate: Certificate, rng: Random) -> Iterat
 def of_a_task_with_a_plan(
     problem: Problem, meant: Interpreter, reached: Sequence[State], rng: Random
 ) -> Iterator[tuple[str, Certificate]]:
-    """Yield random certificates of a task that has a plan; all claims except those about the goal hold in all reachable states.
+    """Yield random certificates of a task that has a plan.
 
+    All claims except those about the goal hold in all reachable states, or in all states that are reachable without one behaviour.
     One certificate claims that the goal excludes a fact that no task requires.
     """
     symbols = [symbol for symbol, slot in meant.slots.items() if slot < meant.stated]
     rests = {s: kind.rest for s in symbols if (kind := meant.kinds[s.situation]).rest and s not in problem.goal}
     final = sorted(Fact(symbol, value) for symbol, value in {**rests, **problem.goal}.items())
-    bounded = tuple(symbol for symbol in meant.symbols if is_bounded(problem, symbol))
+    totals = (
+        Symbol(name, row)
+        for name, one in problem.domain.aggregates.items()
+        for row in product(*(problem.classes.get(p.kind, ()) for p in one.parameters))
+    )
+    bounded = tuple(symbol for symbol in totals if is_bounded(problem, symbol))
+    known = [(meant, reached), *without_a_behavior(meant, rng)]
     for share in SHARES:
+        by, states = rng.choice(known)
         apart = {symbol: () for symbol in symbols if rng.random() < share}
         always, never = dict[Symbol, str](), set[Fact]()
         for symbol in symbols:
-            values = {meant.value(state, symbol) for state in reached}
+            values = {by.value(state, symbol) for state in states}
             kind = meant.kinds[symbol.situation]
             if symbol in apart or None in values:
                 continue
             if len(values) == 1 and rng.random() < 0.8:
                 (value,) = values
-                always[symbol] = str(value) if kind.quantity is None else written(value)
+                always[symbol] = str(value) if kind.quantity is None else written(Fraction(value))
             elif kind.quantity is None:
                 others = (FALSE, TRUE) if kind.boolean else problem.members(kind.range)
                 never.update(Fact(symbol, value) for value in others if value not in values)
@@ -109,6 +120,18 @@ def of_a_task_with_a_plan(
                 found = Certificate(told_apart=dict.fromkeys(symbols, ()), unmet=(*final, fact))
                 yield "with a fact that the task doesn't require", found
                 break
+
+
+def without_a_behavior(meant: Interpreter, rng: Random) -> Iterator[tuple[Interpreter, Sequence[State]]]:
+    """Yield interpreters without one of two behaviours of the lowest level, each with the states that are reachable then."""
+    problem = meant.problem
+    lowest = [behavior.name for behavior in problem.domain.at_level(problem.domain.levels[-1])]
+    for name in rng.sample(lowest, min(2, len(lowest) - 1)):
+        others = {other: one for other, one in problem.domain.behaviors.items() if other != name}
+        fewer = Interpreter(replace(problem, domain=replace(problem.domain, behaviors=others)))
+        with suppress(TooManyStatesError):
+            found = fewer.explored(problem.domain.levels[-1], MOST_STATES, rests=False).costs
+            yield fewer, [state for state, _ in found]
 
 
 def accepted(problem: Problem, what: str, certificate: Certificate) -> bool:
