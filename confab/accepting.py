@@ -11,20 +11,9 @@ from typing import TYPE_CHECKING, NoReturn, Protocol, SupportsIndex, TypeAlias, 
 from confab import ontology
 from confab.interchange import read_plan
 from confab.planner.plan import Plan
+from confab.reasoner import kinds
 from confab.reasoner.files import STDOUT
 from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
-from confab.reasoner.kinds import (
-    CONVERTED,
-    EPISODE,
-    FILM,
-    GENERATED,
-    IMPORTED,
-    MEMORY,
-    PLAN,
-    REPORT,
-    SAVED,
-    VERDICTS,
-)
 from confab.reasoner.limits import Deadline
 from confab.reasoner.names import nearest
 from confab.reasoner.possible import ImpossibleStateError
@@ -242,13 +231,13 @@ def check_seconds(name: str, given: object) -> None:
 
 TURTLE, JSON = ("Turtle", ".ttl"), ("JSON", ".json")
 ENDINGS: Mapping[str, tuple[str, ...]] = {
-    PLAN: JSON,
-    VERDICTS: JSON,
-    EPISODE: ("Turtle or JSON", ".ttl", ".json"),
-    MEMORY: ("Turtle", ".ttl", ""),
-    REPORT: ("HTML", ".html", ".htm"),
-    FILM: ("a film", ".mp4", ".gif"),
-    **dict.fromkeys((GENERATED, SAVED, IMPORTED, CONVERTED), TURTLE),
+    kinds.PLAN: JSON,
+    kinds.VERDICTS: JSON,
+    kinds.EPISODE: ("Turtle or JSON", ".ttl", ".json"),
+    kinds.MEMORY: ("Turtle", ".ttl", ""),
+    kinds.REPORT: ("HTML", ".html", ".htm"),
+    kinds.FILM: ("a film", ".mp4", ".gif"),
+    **dict.fromkeys((kinds.GENERATED, kinds.SAVED, kinds.IMPORTED, kinds.CONVERTED), TURTLE),
 }
 """The form in which content of a kind is written, and the endings of file names for this form."""
 
