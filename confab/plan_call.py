@@ -16,6 +16,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
+from importlib import import_module
 from importlib.util import find_spec
 from math import inf
 from pathlib import Path
@@ -159,6 +160,8 @@ def planned(task: PlanningTask) -> Found:
             raise KnowledgeError("a task whose steps must overlap can't have soft goals; drop the :weight of its goals")
         problem = task.with_measured_durations(problem if task.reading.whole else task.whole())
         return Found(problem, *concurrent(problem, task.deadline), None, False)
+    if asks_for_times(problem, task.options.minimise):
+        import_module("confab.planner.timed.call")  # the search has a share of the time that is left afterwards
     if faulty:
         problem, outcome = searched_without(task, problem, faulty)
     else:
