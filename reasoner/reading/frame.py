@@ -134,6 +134,13 @@ def frame(
         remembers=before.remembers,
     )
     domain = replace(domain, remembers=remembers_in_order(domain, names))
+    for name in sorted(rules):
+        if domain.situations[name].rest is not None:
+            raise KnowledgeError(
+                f"{name} is derived, and has a c:restValue; only behaviours restore rest values; state rest values of the "
+                "situation types that its rules read, or a goal, instead",
+                names.iri(name),
+            )
     for behavior in lifted.values():
         _check_behavior(behavior, domain)
     following: list[Rule | Aggregate] = [*chain.from_iterable(rules.values()), *aggregates.values()]

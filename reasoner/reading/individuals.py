@@ -137,9 +137,9 @@ def values_of(iris: Iterable[str]) -> str:
 
 
 def constants_of(schema: OntologySchema) -> set[str]:
-    """Return the individuals in the conditions, effects and definitions of a schema, and its rest values and default values."""
+    """Return the individuals in the conditions, effects and definitions of a schema, its actors, rest values and default values."""
     goals = goal_conditions(schema)
-    names = (*PLACES, CORE + "restValue", CORE + "defaultValue")
+    names = (*PLACES, CORE + "restValue", CORE + "defaultValue", CORE + "actor")
     found = {v for iri, node in schema.nodes.items() if iri not in goals for name in names for v in node.get(name, ())}
     named = (OWL + "hasValue", RDF + "first")
     found |= {v for node in schema.expressions.values() for name in named for v in node.get(name, ()) if ":" in v}

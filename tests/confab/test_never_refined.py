@@ -95,3 +95,13 @@ def test_a_task_is_planned_without_a_behaviour_that_can_be_in_no_plan(
     """
     plan = scene(tmp_path, DYED, stain).plan(**options).plan  # type: ignore[arg-type]
     assert [step.behavior for step in plan.primitives] == ["DIP"]
+
+
+def test_a_rest_value_of_a_derived_situation_type_is_an_error(tmp_path: Path) -> None:
+    derived = """
+w:DAMP a owl:Class, owl:NamedIndividual, :SituationType ; :fromLevel 2 ; :restValue :false .
+w:Thing :hasSituationType w:DAMP .
+w:DAMP.rule a owl:NamedIndividual, :Rule ; :construct "CONSTRUCT { ?x w:DAMP true } WHERE { ?x a w:Thing . ?x w:WET true }" .
+"""
+    with pytest.raises(KnowledgeError, match=r"DAMP is derived, and has a c:restValue.*its rules read"):
+        scene(tmp_path, DYED, WETTED, DRIED, derived).plan()

@@ -150,6 +150,28 @@ SLOW_DRIVES = (
 )
 
 
+def test_an_individual_that_only_an_actor_names_is_available_in_its_windows(tmp_path: Path) -> None:
+    washed = ROBOTS.replace(EVER, "").replace("c:actor :WASH.robot", "c:actor :WASH.robot, :daylight")
+    file = tmp_path / "daylight.ttl"
+    file.write_text(
+        washed
+        + """
+:Light a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object .
+:daylight a :Light, owl:NamedIndividual . :hall a :Room, owl:NamedIndividual .
+:r1 a :Robot, owl:NamedIndividual ; :in :hall .
+:r1.charged a owl:NamedIndividual, c:SituatedObjectInstance ; c:about :r1 ; c:situationType :CHARGED .
+:day a owl:NamedIndividual, c:Window ; c:ofIndividual :daylight ; c:availableFrom "PT7S"^^xsd:dayTimeDuration .
+[ a owl:AllDifferent ; owl:distinctMembers ( :daylight :hall :r1 ) ] .
+:task a owl:NamedIndividual, c:Task ; c:goal :task.g .
+:task.g a owl:NamedIndividual, c:ValueCondition ; c:about :hall ; c:situationType :CLEAN .
+""",
+        "utf-8",
+    )
+    timed = confab.load(file).plan().timed
+    assert timed is not None
+    assert [(slot.begin, slot.end, slot.actors) for slot in timed.slots] == [(7, 17, ("r1", "daylight"))]
+
+
 @pytest.mark.parametrize("minimise", [None, "cost"])
 def test_quick_steps_are_chosen_for_deadlines_that_cheap_steps_miss(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, minimise: Minimise | None
