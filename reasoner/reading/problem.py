@@ -24,7 +24,7 @@ from confab.reasoner.aggregates.totals import exceptions, with_totals
 from confab.reasoner.condition_nodes import NodeValues
 from confab.reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
 from confab.reasoner.language import DomainError
-from confab.reasoner.limits import check
+from confab.reasoner.limits import check, checked
 from confab.reasoner.names import Names, brief
 from confab.reasoner.reading.facts import check_values, facts_of, initial_state
 from confab.reasoner.reading.frame import Frame, frame, names_of
@@ -100,9 +100,8 @@ def read_names(graph: KnowledgeGraph) -> Names:
 
 def members_of(graph: KnowledgeGraph) -> list[Member]:
     """Return the individuals of a graph with their classes and indices."""
-    return [
-        (text(who), text(kind), index_of(text(who), text(index))) for who, kind, index in graph.select(MEMBERS, SCENE)
-    ]
+    rows = checked(graph.select(MEMBERS, SCENE), "reading the scene")
+    return [(text(who), text(kind), index_of(text(who), text(index))) for who, kind, index in rows]
 
 
 def reading_of(
