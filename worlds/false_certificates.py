@@ -184,7 +184,7 @@ def disproved(meant: Interpreter, certificate: Certificate, symbol: Symbol, valu
     """Return whether a state that a certificate allows leads to a state that the certificate excludes.
 
     A tested state is a reachable state with another value of the symbol whose claim was removed. All other claims of the
-    certificate hold in a tested state, and the state belongs to the case of the reachable state: sums that the certificate
+    certificate hold in a tested state, and the state belongs to the case of the reachable state: symbols that the certificate
     tells apart are unchanged. The plain interpreter, which shares no code with the checker, searches for the goal or the
     opposite of a claim.
     """
@@ -203,9 +203,7 @@ def disproved(meant: Interpreter, certificate: Certificate, symbol: Symbol, valu
         )
 
     def of_one_case(state: State, changed: State) -> bool:
-        return all(
-            meant.value(state, one) == meant.value(changed, one) for one in certificate.told_apart if one != symbol
-        )
+        return all(meant.value(state, one) == meant.value(changed, one) for one in certificate.told_apart)
 
     def allowed(state: State) -> bool:
         never = any(meant.meets(state, fact.symbol, fact.value) for fact in certificate.never)
