@@ -15,7 +15,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from math import inf
@@ -249,9 +248,14 @@ def searched(task: PlanningTask, problem: Problem) -> tuple[Problem, Outcome]:
     def comparing(choice: Problem) -> Searching:
         return first if choice.goal.keys().isdisjoint(problem.weights) else bounded
 
+    def in_its_times(choice: Problem, found: Outcome) -> Outcome:
+        if found.plan is None or not asks_for_times(choice, None):
+            return found
+        return scheduled(task.with_measured_durations(choice), found, task.deadline, False)[0]
+
     def choose(choice: Problem) -> Outcome:
         limit = "half of the time limit, which is for proofs"
-        return search_in_time(task, comparing(choice), (seconds or 0.0) / 2, limit, choice)
+        return in_its_times(choice, search_in_time(task, comparing(choice), (seconds or 0.0) / 2, limit, choice))
 
     def shorten(choice: Problem, found: Outcome, work: Shortening) -> Outcome:
         how = Searching(mode) if work == "once" else comparing(choice)
@@ -262,7 +266,11 @@ def searched(task: PlanningTask, problem: Problem) -> tuple[Problem, Outcome]:
         chosen, outcome = preferred(alike, choose, shorten=None if fixed else shorten)
     else:
         least = max((seconds or 0.0) / 10, 2 * task.checking)
-        prove = partial(search_in_time, task, Searching(mode, share=0.5), least, "the time limit")
+
+        def prove(choice: Problem) -> Outcome:
+            how = Searching(mode, share=0.5)
+            return in_its_times(choice, search_in_time(task, how, least, "the time limit", choice))
+
         chosen, outcome = preferred(alike, choose, prove)
     return replace(problem, goal=chosen.goal, weights=chosen.weights), outcome
 

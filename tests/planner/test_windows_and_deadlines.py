@@ -15,6 +15,7 @@ import confab.plan_call
 import confab.timing
 from confab.cli import app
 from confab.planner.plan import Outcome, Status
+from confab.planner.solve import Mode
 from confab.planner.timed.plan import TimedPlan
 from confab.planner.timed.sharing import crews_of
 from confab.planning import Result
@@ -62,10 +63,12 @@ def planned(
     windows: Sequence[tuple[str, int, int | None]] = (),
     chargers: Mapping[str, str] | None = None,
     minimise: Minimise | None = None,
+    soft: Mapping[str, int] | None = None,
+    mode: Mode = "guarded",
 ) -> Result:
     """Plan for robots with their rooms, rooms to be washed with deadlines, windows, and chargers with their rooms.
 
-    Without chargers, robots stay charged.
+    Without chargers, robots stay charged. `soft` contains the weights of soft goals.
     """
     given = ROBOTS if chargers else ROBOTS.replace(EVER, "")
     chargers = chargers or {}
@@ -88,11 +91,12 @@ def planned(
     lines.append(f":task a owl:NamedIndividual, c:Task ; c:goal {', '.join(f':{one}.goal' for one in goals)} .")
     for one, by in goals.items():
         deadline = "" if by is None else f' ; c:by "PT{by}S"^^xsd:dayTimeDuration'
+        deadline += f" ; c:weight {soft[one]}" if soft and one in soft else ""
         lines.append(
             f":{one}.goal a owl:NamedIndividual, c:ValueCondition ; c:situationType :CLEAN ; c:about :{one}{deadline} ."
         )
     (folder / "robots.ttl").write_text(given + "\n".join(lines), "utf-8")
-    return confab.load(folder / "robots.ttl").plan(minimise=minimise)
+    return confab.load(folder / "robots.ttl").plan(minimise=minimise, mode=mode)
 
 
 def said(result: Result) -> str:
@@ -148,6 +152,16 @@ SLOW_DRIVES = (
 :FLY.robot a owl:NamedIndividual .
 """
 )
+
+
+@pytest.mark.parametrize("mode", ["guarded", "optimal", "paper"])
+@pytest.mark.parametrize(("by", "unmet"), [(12, {"b"}), (30, set())])
+def test_a_soft_goal_is_left_unmet_if_no_schedule_meets_its_deadline_too(
+    tmp_path: Path, mode: Mode, by: int, unmet: set[str]
+) -> None:
+    result = planned(tmp_path, {"r1": "a"}, {"a": 12, "b": by}, soft={"b": 5}, mode=mode)
+    assert result.outcome.status is Status.SOLVED
+    assert {symbol.arguments[0] for symbol in result.outcome.unmet} == unmet
 
 
 def test_an_individual_that_only_an_actor_names_is_available_in_its_windows(tmp_path: Path) -> None:
