@@ -90,7 +90,7 @@ def test_an_execution_whose_goal_becomes_impossible_exits_with_1_and_the_reason(
         (["--world", "moon"], "unknown world 'moon'"),
         (["--mode", "magic"], "unknown mode 'magic'"),
         (["--memory", "m.ttl", "--learn", "--save", "./m.ttl"], "one file for two purposes"),
-        (["--save", "beverage-serving"], "one file for two purposes"),
+        (["--save", "beverage-serving"], "wanted a name that ends in .ttl or .json"),
     ],
 )
 def test_misuse_is_one_clear_line(arguments: list[str], word: str) -> None:

@@ -74,16 +74,19 @@ def sent(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[Path], Path, di
     return files, back, through_the_owl_api([*files, *(folder / name for name in WORKED_OUT)], back)
 
 
-def test_every_file_survives_a_round_trip_and_conforms_to_owl_2_dl(
+def test_every_file_survives_a_round_trip_and_conforms_to_owl_2_dl_but_for_durations(
     sent: tuple[list[Path], Path, dict[str, list[str]]],
 ) -> None:
+    """OWL 2 DL has no `xsd:dayTimeDuration`, the datatype of times (docs/authoring.md)."""
     files, back, violations = sent
     names = [file.name for file in files]
     assert {"soma-alignment.ttl", "cereal-serving.reach.ttl", "ferry.ttl", "watering-bodies.ttl", "memory.ttl"} <= {
         *names
     }
     assert len({*names, *WORKED_OUT}) == len(names) + len(WORKED_OUT), "files of one name would overwrite each other"
-    assert {file: found for file, found in violations.items() if found} == {}
+    found = {Path(file).name: [one for one in its if "dayTimeDuration" not in one] for file, its in violations.items()}
+    assert {name: its for name, its in found.items() if its} == {}
+    assert [Path(file).name for file, its in violations.items() if its] == ["bakery.ttl"]
     assert [file.name for file in files if canonical(file) != canonical(back / file.name)] == []
 
 
