@@ -12,7 +12,9 @@ from worlds.interpreter import Interpreter
 
 
 def corrupted(plan: Plan, problem: Problem, rng: Random) -> Plan:
-    """Return a plan with one random change in its tree."""
+    """Return a plan with one random change in its tree; a plan without steps stays as it is."""
+    if not plan.steps:
+        return plan
     path = rng.choice([step.path for step in plan.walk()])
     return Plan(renumbered(_changed(plan.steps, path, problem, rng)))
 

@@ -669,7 +669,7 @@ class Judge:
     def execution(self, read: Scene, first: Outcome | None) -> None:
         """Execute the task, sometimes with a fact that changes during execution."""
         texts: list[str] = []
-        if first is not None and first.plan is not None and self.rng.random() < 0.7:
+        if first is not None and first.plan is not None and first.plan.steps and self.rng.random() < 0.7:
             steps = [step for step in first.plan.primitives if len(step.path) > 1]
             after = ".".join(map(str, self.rng.choice(steps).path)) if steps else str(first.plan.primitives[0].id)
             if fact := self.fact():
