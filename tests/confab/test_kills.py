@@ -38,5 +38,4 @@ def test_the_benchmark_detects_a_lost_episode_after_a_kill(monkeypatch: pytest.M
 
 def test_the_benchmark_detects_a_lost_episode_among_eight_learners(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kills, "alone", lambda _: nullcontext())  # no process waits for another
-    _, lost = kills.crowd(3)
-    assert lost > 0
+    assert any(kills.crowd(3, seed)[1] > 0 for seed in range(5))  # whether two processes meet depends on the machine
