@@ -8,8 +8,9 @@
     CONFAB_KINDS=worlds CONFAB_COUNT=1000 …              the random worlds only
     CONFAB_KINDS=families CONFAB_SIZES=10,40 …           the families only, with these numbers of objects
 
-Each run is a separate process, limited to 30 s of CPU time. Plans of Confab are judged by unified-planning's
-TimeTriggeredPlanValidator, with conflicting events 1 ms apart.
+Each run is a separate process, limited to 30 s of CPU time. LPG improves its plan until the limit. If Confab's own search finds no
+plan in sequence, an installed engine of unified-planning searches for one in the rest of the time, as in `confab plan`. Plans of
+Confab are judged by unified-planning's TimeTriggeredPlanValidator, with conflicting events 1 ms apart.
 """
 
 from __future__ import annotations
@@ -174,6 +175,7 @@ def one(domain: Path, problem: Path) -> None:
     from confab.planner.solve import Request, solve
     from confab.planner.timed import concurrent
     from confab.planner.timed.call import best_in_time
+    from confab.reasoner.graph.knowledge import KnowledgeError
     from confab.reasoner.pddl.importing import imported
     from confab.reasoner.pddl.syntax import parse_files
     from confab.reasoner.timing import only_during
@@ -188,7 +190,7 @@ def one(domain: Path, problem: Path) -> None:
     else:
         plan = solve(Request(found.problem, limits=Limits(seconds=SECONDS * OWN))).plan
         if plan is None:
-            with suppress(Exception):  # no engine, or no plan in time
+            with suppress(KnowledgeError):  # no engine
                 plan = plan_by_engine(found.problem, None, None, SECONDS - VALIDATING - used()).plan
         left = max(SECONDS - VALIDATING - used(), 1.0)
         timed = None if plan is None else best_in_time(found.problem, plan, left, separation=EPSILON).plan

@@ -220,7 +220,7 @@ _SCENE = click.argument(
 )
 
 
-def _changing(context: click.Context, option: click.Parameter, given: tuple[str, ...]) -> None:
+def _stored(context: click.Context, option: click.Parameter, given: tuple[str, ...]) -> None:
     context.meta[str(option.name)] = given
 
 
@@ -230,7 +230,7 @@ _FACTS = click.option(
     multiple=True,
     metavar="FACT",
     expose_value=False,
-    callback=_changing,
+    callback=_stored,
     help="A fact that replaces the scene's fact about its symbol, e.g. 'cup1 LOCATION location3'; repeatable.",
 )
 _WITHOUT_GOALS = click.option(
@@ -239,7 +239,7 @@ _WITHOUT_GOALS = click.option(
     multiple=True,
     metavar="GOAL",
     expose_value=False,
-    callback=_changing,
+    callback=_stored,
     help="A goal of the scene to leave out, by its first words, e.g. 'cup1 LOCATION'; all: every goal; repeatable.",
 )
 

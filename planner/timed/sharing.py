@@ -7,8 +7,8 @@ were achieved before still hold after a stretch.
 
 The first sequence of tasks follows the plan, or assigns each goal greedily to the crew that achieves the goal first. Then the
 search makes one change at a time, preferably to a task on the critical path. A change concerns the crew or the position of a task.
-Without a time limit, the work is bounded, and the result is the same on every machine. With a time limit, the search continues
-until the limit, unless the schedule reaches a lower bound or all actors are busy for the whole makespan.
+The search ends if the schedule reaches a lower bound, if all actors are busy for the whole makespan, or after many changes without
+a better schedule. Without a time limit, the work is bounded, too, so that the result is the same on every machine.
 """
 
 from __future__ import annotations
@@ -125,8 +125,7 @@ def shared(
     plan : Plan
         A plan of the problem, which determines the first order of the goals.
     until : float, optional
-        The end of the search, on the clock of `perf_counter`. Without it, the search ends after a number of changes that
-        depends only on the problem.
+        The end of the search, on the clock of `perf_counter`.
     shorten : bool
         Whether the search continues after it has found a schedule that keeps all time windows and deadlines.
     bound : Fraction
@@ -269,24 +268,28 @@ class _SharingSearch:
         now = self.best
         if now is None:
             return
-        random, barren = Random(0), 0
-        while now.critical and (until is not None or barren < self.most_barren(now)):
+        random, changes, better = Random(0), 0, 0
+        while now.critical and changes - better < self.most_barren(now, better):
             if not (self.shorten or now.cost[0]):
                 break
             if not now.cost[0] and (now.cost[1] <= self.bound or evenly_shared(self.problem, now.work, now.cost[1])):
                 break
             self.spend(0)
             other = self.built(self.changed(now, random), now)
-            barren += 1
+            changes += 1
             if other is None or other.cost > now.cost:
                 continue
             if other.cost < now.cost:
-                barren = 0
+                better = changes
             now = self.best = other
 
-    def most_barren(self, now: _Sequence) -> int:
-        """Return the maximum number of successive changes without a better schedule."""
-        return MOST_BARREN if now.cost[0] else min(BARREN * len(now.tasks), MOST_BARREN)
+    def most_barren(self, now: _Sequence, better: int) -> int:
+        """Return the maximum number of successive changes without a better schedule after `better` changes.
+
+        With a time limit, it is at least the number of changes until the last better schedule.
+        """
+        least = MOST_BARREN if now.cost[0] else min(BARREN * len(now.tasks), MOST_BARREN)
+        return least if self.until is None else max(least, better)
 
     def own(self) -> _Sequence | None:
         """Return the sequence of tasks that follows the plan.

@@ -134,13 +134,7 @@ def frame(
         remembers=before.remembers,
     )
     domain = replace(domain, remembers=remembers_in_order(domain, names))
-    for name in sorted(rules):
-        if domain.situations[name].rest is not None:
-            raise KnowledgeError(
-                f"{name} is derived, and has a c:restValue; only behaviours restore rest values; state rest values of the "
-                "situation types that its rules read, or a goal, instead",
-                names.iri(name),
-            )
+    _check_rest_values(domain, names)
     for behavior in lifted.values():
         _check_behavior(behavior, domain)
     following: list[Rule | Aggregate] = [*chain.from_iterable(rules.values()), *aggregates.values()]
@@ -170,7 +164,7 @@ def names_of(schema: OntologySchema, members: Iterable[Member], namesakes: Itera
             *iris_of_the_past(schema),
             *(task for task in schema.of_kind("Task") if derived.intersection(nodes[task].get(CORE + "goal", ()))),
             *chain.from_iterable(
-                (who, kind) for who, kind, _ in checked(members, "reading the scene") if who not in nodes
+                (iri, kind) for iri, kind, _ in checked(members, "reading the scene") if iri not in nodes
             ),
             *chain.from_iterable((sub, *above) for sub, above in schema.supers.items()),
             *(kind for node in typed for name in ("termType", "ofClass") for kind in node.get(CORE + name, ())),
@@ -368,6 +362,17 @@ def _value_properties(schema: OntologySchema) -> dict[str, tuple[str, bool]]:
         for iri in schema.of_kind("SituationType")
         for prop in schema.nodes[iri].get(CORE + "valueProperty", ())
     }
+
+
+def _check_rest_values(domain: Domain, names: Names) -> None:
+    """Raise `KnowledgeError` if a derived situation type has a rest value."""
+    for name in sorted(domain.rules):
+        if domain.situations[name].rest is not None:
+            raise KnowledgeError(
+                f"{name} is derived, and has a c:restValue; only behaviours restore rest values; state rest values of the "
+                "situation types that its rules read, or a goal, instead",
+                names.iri(name),
+            )
 
 
 def _check_behavior(behavior: Behavior, domain: Domain) -> None:

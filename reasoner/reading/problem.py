@@ -101,7 +101,7 @@ def read_names(graph: KnowledgeGraph) -> Names:
 def members_of(graph: KnowledgeGraph) -> list[Member]:
     """Return the individuals of a graph with their classes and indices."""
     rows = checked(graph.select(MEMBERS, SCENE), "reading the scene")
-    return [(text(who), text(kind), index_of(text(who), text(index))) for who, kind, index in rows]
+    return [(text(iri), text(kind), index_of(text(iri), text(index))) for iri, kind, index in rows]
 
 
 def reading_of(

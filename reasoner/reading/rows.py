@@ -250,7 +250,7 @@ def classes_of(
         of[individual] |= closure(kind)
         place[individual] = min(index, place.get(individual, index))
     members: dict[str, list[str]] = {kind: [] for kind in {*supers, *chain.from_iterable(supers.values())}}
-    named = [(place[who], names.short(who), kinds) for who, kinds in checked(of.items(), "reading the scene")]
+    named = [(place[iri], names.short(iri), kinds) for iri, kinds in checked(of.items(), "reading the scene")]
     for _, name, kinds in sorted(named):
         for kind in kinds:
             members.setdefault(kind, []).append(name)

@@ -197,6 +197,15 @@ def test_quick_steps_are_chosen_for_deadlines_that_cheap_steps_miss(
     assert {"GO", "FLY"} >= {step.behavior for step in result.plan.primitives} - {"WASH"} >= {"FLY"}
 
 
+def test_shortening_a_plan_for_soft_goals_keeps_their_deadlines(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(f"{__name__}.ROBOTS", SLOW_DRIVES)
+    result = planned(tmp_path, {"r1": "hall"}, {"a": 15, "b": 30, "c": 90}, soft={"b": 50, "c": 50})
+    assert result.timed is not None
+    assert not result.outcome.unmet
+
+
 def test_no_actor_is_chosen_for_a_class_that_contains_another_class_of_actors(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
