@@ -60,7 +60,10 @@ The search does this maximum work in about twenty seconds.
 CHOICE = 0.25
 """The share of the remaining time in which a plan for one choice of soft goals is searched."""
 CHOICE_WORK = 1_000_000
-"""Maximum work of the search of a plan for one choice of soft goals, if there is no time limit."""
+"""Maximum work of the search of a plan for one choice of soft goals, if there is no time limit.
+
+After more work for another choice, the maximum is twice that work.
+"""
 
 
 @dataclass(frozen=True)
@@ -112,14 +115,15 @@ class Found(NamedTuple):
 class Searching(NamedTuple):
     """The mode of a search, the share of the time limit that the search may use, and the work for a shorter plan.
 
-    By default, the work depends on the time limit. If `bounded` is true and there is no time limit, the work of the search is
-    limited. A bounded search uses no engine. `first` is an outcome whose plan is shortened instead of searching.
+    By default, the work for a shorter plan depends on the time limit. If `most_work` is given, it limits the work of a search
+    without a time limit, and the search uses no engine. `first` is an outcome whose plan is extended or shortened instead of
+    searching.
     """
 
     mode: str
     share: float = 1.0
     shortening: Shortening | None = None
-    bounded: bool = False
+    most_work: float = inf
     first: Outcome | None = None
 
 
@@ -243,10 +247,12 @@ def searched(task: PlanningTask, problem: Problem) -> tuple[Problem, Outcome]:
 
     alike = with_unit_costs(problem) if task.options.minimise == "steps" else problem
     first, seconds = Searching(DEFAULT_MODE if mode == "optimal" else mode, shortening="none"), task.deadline.left
-    bounded = first._replace(share=CHOICE, bounded=True)
+    bounded, worked = first._replace(share=CHOICE, most_work=CHOICE_WORK), 0
 
     def comparing(choice: Problem) -> Searching:
-        return first if choice.goal.keys().isdisjoint(problem.weights) else bounded
+        if choice.goal.keys().isdisjoint(problem.weights):
+            return first
+        return bounded._replace(most_work=max(CHOICE_WORK, 2 * worked))
 
     def in_its_times(choice: Problem, found: Outcome) -> Outcome:
         if found.plan is None or not asks_for_times(choice, None):
@@ -255,15 +261,23 @@ def searched(task: PlanningTask, problem: Problem) -> tuple[Problem, Outcome]:
 
     def choose(choice: Problem) -> Outcome:
         limit = "half of the time limit, which is for proofs"
-        return in_its_times(choice, search_in_time(task, comparing(choice), (seconds or 0.0) / 2, limit, choice))
+        found = search_in_time(task, comparing(choice), (seconds or 0.0) / 2, limit, choice)
+        nonlocal worked
+        worked = max(worked, found.effort if found.plan is not None else 0)
+        return in_its_times(choice, found)
 
     def shorten(choice: Problem, found: Outcome, work: Shortening) -> Outcome:
         how = Searching(mode) if work == "once" else comparing(choice)
         return search(task, choice, how._replace(shortening=work, first=found))
 
+    def extended(choice: Problem, found: Outcome) -> Outcome:
+        how = bounded._replace(first=found)
+        return in_its_times(choice, search_in_time(task, how, (seconds or 0.0) / 10, "the time limit", choice))
+
+    fixed = task.options.by_engine or mode == "paper"
+    extend = None if fixed else extended
     if seconds is None and mode != "optimal":
-        fixed = task.options.by_engine or mode == "paper"
-        chosen, outcome = preferred(alike, choose, shorten=None if fixed else shorten)
+        chosen, outcome = preferred(alike, choose, shorten=None if fixed else shorten, extend=extend)
     else:
         least = max((seconds or 0.0) / 10, 2 * task.checking)
 
@@ -271,7 +285,7 @@ def searched(task: PlanningTask, problem: Problem) -> tuple[Problem, Outcome]:
             how = Searching(mode, share=0.5)
             return in_its_times(choice, search_in_time(task, how, least, "the time limit", choice))
 
-        chosen, outcome = preferred(alike, choose, prove)
+        chosen, outcome = preferred(alike, choose, prove, extend=extend)
     return replace(problem, goal=chosen.goal, weights=chosen.weights), outcome
 
 
@@ -290,7 +304,7 @@ def search(task: PlanningTask, problem: Problem, how: Searching) -> Outcome:
         from confab.engines import plan_by_engine
 
         return certified(problem, plan_by_engine(problem, options.engine, options.level, deadline.left))
-    engines = options.leave_levels and options.engine != NO_ENGINE and not how.bounded
+    engines = options.leave_levels and options.engine != NO_ENGINE and how.most_work == inf
     request = own_request(task, problem, how, engines)
     unlimited = request.limits.seconds is None and how.mode != "paper" and find_spec("unified_planning") is not None
     again = request if engines and unlimited else None
@@ -320,7 +334,7 @@ def own_request(task: PlanningTask, problem: Problem, how: Searching, engines: b
     return Request(
         with_unit_costs(problem) if options.minimise == "steps" else problem,
         how.mode,
-        Limits(seconds=seconds, work=CHOICE_WORK if how.bounded and seconds is None else inf, shortening=shortening),
+        Limits(seconds=seconds, work=how.most_work if seconds is None else inf, shortening=shortening),
         None if memory is None or isinstance(memory, Links) else memory.advisor,
         links,
         task.grounds,

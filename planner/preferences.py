@@ -8,8 +8,12 @@ First, `preferred` plans for the hard goals alone. If there is no plan for the h
 replaces a rest value. Second, it plans for all soft goals together. From either choice, it adds or drops one soft goal at a time,
 the heaviest first, until no such change makes the choice cheaper. These plans only compare choices, so they needn't be shortened.
 If `shorten` is given, `preferred` then shortens the plans of the few cheapest choices with little work, and the plan of the best
-of them with the full work. If `prove` is given, it finally computes a lower bound for the choice and for all choices that could
-be cheaper. Choices with a smaller sum of unmet weights come first.
+of them with the full work. If `prove` is given, it computes a lower bound for the choice and for all choices that could be
+cheaper. Choices with a smaller sum of unmet weights come first.
+
+If `extend` is given, a choice for which the search gave up gets the plan of a choice with fewer goals, extended by steps for the
+other goals. Finally, the plan of the result is extended by steps for each unmet soft goal whose weight exceeds the cost of these
+steps.
 """
 
 from __future__ import annotations
@@ -31,6 +35,7 @@ from confab.reasoner.symbols import Fact, Problem, Symbol
 
 PlanSearch: TypeAlias = "Callable[[Problem], Outcome]"
 Shortener: TypeAlias = "Callable[[Problem, Outcome, Shortening], Outcome]"
+Extender: TypeAlias = "Callable[[Problem, Outcome], Outcome]"
 Goals: TypeAlias = frozenset[Symbol]
 MOST_CHOICES = 200
 """Maximum number of choices for which a separate plan is searched in order to prove that no other choice is cheaper."""
@@ -41,7 +46,11 @@ PRECISION = 1_000_000
 
 
 def preferred(
-    problem: Problem, search: PlanSearch, prove: PlanSearch | None = None, shorten: Shortener | None = None
+    problem: Problem,
+    search: PlanSearch,
+    prove: PlanSearch | None = None,
+    shorten: Shortener | None = None,
+    extend: Extender | None = None,
 ) -> tuple[Problem, Outcome]:
     """Choose among the soft goals of a task; return the task without the unmet soft goals, and the outcome of planning for it.
 
@@ -56,10 +65,12 @@ def preferred(
         weights isn't excluded.
     shorten : callable, optional
         Function that shortens the plan of an outcome of `search`.
+    extend : callable, optional
+        Function that plans for the goals of a problem by additional steps after the plan of an outcome, or gives up.
     """
     if not problem.weights:
         return problem, (prove or search)(problem)
-    choices = _SoftGoalChoices(problem, search, prove)
+    choices = _SoftGoalChoices(problem, search, prove, extend)
     nothing, everything = Goals(), Goals(problem.weights)
     if choices.total(nothing) is None:
         choices.least(nothing)
@@ -72,11 +83,12 @@ def preferred(
             choices.settle(start)
     best, *others = choices.compared()
     if prove is not None:
-        return choices.result(*choices.cheapest(best))
+        best, least = choices.cheapest(best)
+        return choices.result(best, choices.outcome(best), least)
     if shorten is None:
-        return choices.result(best)
+        return choices.result(best, choices.outcome(best))
     best = choices.shortened([best, *others[: SHORTENED - 1]], shorten)
-    return choices.result(best, outcome=shorten(choices.task(best), choices.briefly[best], "once"))
+    return choices.result(best, shorten(choices.task(best), choices.briefly[best], "once"), shorten=shorten)
 
 
 class _SoftGoalChoices:
@@ -85,15 +97,17 @@ class _SoftGoalChoices:
     `briefly` are the outcomes with shortened plans. `away` are the soft goals with another value than the rest value of their
     symbol. If such a goal isn't chosen, its symbol must be at rest in the end, so that a plan for fewer goals can cost more.
     `ended` and `proofs_ended` state whether the time for searches and proofs is over; each further choice would end in the same
-    way.
+    way. `hard` are the choices for which the search gave up; there is no search for choices with more goals.
     """
 
-    def __init__(self, problem: Problem, search: PlanSearch, prove: PlanSearch | None) -> None:
-        self.problem, self.search, self.prove, self.weights = problem, search, prove, problem.weights
+    def __init__(self, problem: Problem, search: PlanSearch, prove: PlanSearch | None, extend: Extender | None) -> None:
+        self.problem, self.search, self.prove, self.extend = problem, search, prove, extend
+        self.weights = problem.weights
         rests = {symbol: problem.domain.situations[symbol.situation].rest for symbol in problem.weights}
         self.away = Goals(symbol for symbol, rest in rests.items() if rest not in (None, problem.goal[symbol]))
         self.outcomes: dict[Goals, Outcome] = {}
         self.briefly: dict[Goals, Outcome] = {}
+        self.hard: list[Goals] = []
         self.conflicts: list[tuple[frozenset[tuple[Symbol, str]], Outcome]] = []
         self.bounds: dict[Goals, Fraction | None] = {}
         self.prices: dict[int, tuple[Plan, Fraction]] = {}
@@ -106,9 +120,9 @@ class _SoftGoalChoices:
     def outcome(self, kept: Goals) -> Outcome:
         """Return the outcome of planning for a choice.
 
-        There is no search if goals of the choice are known to exclude each other, or if no plan was found for some of the goals
-        alone. If a limit ends a search, the outcome has the status "gave up". If a limit ends the first search, the method
-        raises `LimitError` instead.
+        There is no search if goals of the choice are known to exclude each other, or if a search for some of the goals alone has
+        found no plan. If a limit ends a search, the outcome has the status "gave up". If a limit ends the first search, the method
+        raises `LimitError` instead. If the search gives up, the plan of a choice with fewer goals is extended.
         """
         if kept not in self.outcomes:
             if self.ended:
@@ -117,15 +131,20 @@ class _SoftGoalChoices:
             goals = task.goal_on(task.domain.levels[-1]).items()
             if (known := next((outcome for unmet, outcome in self.conflicts if unmet <= goals), None)) is not None:
                 return self.outcomes.setdefault(kept, known)
-            if any(self.easier(fewer, kept) and outcome.plan is None for fewer, outcome in self.outcomes.items()):
-                return Outcome(Status.GAVE_UP)
-            try:
-                found = self.outcomes[kept] = self.search(task)
-            except LimitError as error:
-                if not self.outcomes:
-                    raise
-                self.ended = isinstance(error, OutOfTimeError)
-                return Outcome(Status.GAVE_UP)
+            found = Outcome(Status.GAVE_UP)
+            if not any(self.easier(fewer, kept) for fewer in self.hard):
+                try:
+                    found = self.search(task)
+                except LimitError as error:
+                    if not self.outcomes:
+                        raise
+                    self.ended = isinstance(error, OutOfTimeError)
+                    return found
+                if found.plan is None:
+                    self.hard.append(kept)
+            if found.status is Status.GAVE_UP and (begun := self.most_begun(kept)) is not None:
+                found = self.extended(kept, begun) or found
+            self.outcomes[kept] = found
             if found.plan is not None:
                 with overtime():
                     met = Goals(self.weights.keys() - unmet_goals(self.problem, found.plan))
@@ -134,6 +153,20 @@ class _SoftGoalChoices:
                 unmet = frozenset((fact.symbol, fact.value) for fact in found.certificate.unmet)
                 self.conflicts.append((unmet, found))
         return self.outcomes[kept]
+
+    def most_begun(self, kept: Goals) -> Outcome | None:
+        """Return the outcome with the cheapest plan for a part of a choice; prefer the parts with the most goals."""
+        parts = [fewer for fewer, outcome in self.outcomes.items() if fewer < kept and outcome.plan is not None]
+        best = min(parts, key=lambda part: (-len(part), self.price(self.outcomes[part])), default=None)
+        return None if best is None else self.outcomes[best]
+
+    def extended(self, kept: Goals, begun: Outcome) -> Outcome | None:
+        """Return an outcome for a choice whose plan begins with the plan of another outcome, or None if none is found."""
+        try:
+            found = None if self.extend is None else self.extend(self.task(kept), begun)
+        except LimitError:
+            return None
+        return None if found is None or found.plan is None else found
 
     def easier(self, fewer: Goals, kept: Goals) -> bool:
         """Return whether every plan for one choice is also a plan for another choice with fewer goals."""
@@ -252,22 +285,34 @@ class _SoftGoalChoices:
                 heapq.heappush(waiting, (unmet + self.weights[order[i]], (*dropped, i)))
 
     def result(
-        self, chosen: Goals, least: Fraction | None = None, outcome: Outcome | None = None
+        self, chosen: Goals, outcome: Outcome, least: Fraction | None = None, shorten: Shortener | None = None
     ) -> tuple[Problem, Outcome]:
         """Return the task of a choice, and the outcome with the unmet soft goals and the additional cost of meeting each goal.
 
-        `least` is a lower bound on the total cost of any choice. `outcome` is the final outcome, by default that of `search`.
+        As long as some steps for an unmet soft goal cost less than its weight, they extend the plan of the outcome. `least` is a
+        lower bound on the total cost of any choice.
         """
-        outcome = outcome or self.outcome(chosen)
-        assert outcome.plan is not None
-        with overtime():
-            kept = Goals(self.weights.keys() - unmet_goals(self.problem, outcome.plan))
+        longer: Outcome | None = outcome
+        while longer is not None:
+            outcome, longer, more = longer, None, dict[Symbol, Fraction | None]()
+            assert outcome.plan is not None
+            with overtime():
+                kept = Goals(self.weights.keys() - unmet_goals(self.problem, outcome.plan))
+            for symbol in reversed(self.by_weight()):
+                if symbol not in kept:
+                    other = self.extended(kept | {symbol}, outcome)
+                    more[symbol] = None if other is None else self.price(other) - self.price(outcome)
+                    if other is not None and self.price(other) - self.price(outcome) < self.weights[symbol]:
+                        kept |= {symbol}
+                        longer = other if shorten is None else shorten(self.task(kept), other, "once")
+                        break
         cost, forgone = self.price(outcome), []
-        for symbol in reversed(self.by_weight()):
-            if symbol not in kept:
-                fact = Fact(symbol, self.problem.goal[symbol])
-                wanted = conditions_of_goal(self.problem.domain, symbol)
-                forgone.append(Forgone(fact, self.weights[symbol], self.more(chosen, symbol), wanted))
+        for symbol, extra in more.items():
+            fact = Fact(symbol, self.problem.goal[symbol])
+            wanted = conditions_of_goal(self.problem.domain, symbol)
+            known = [one for one in (extra, self.more(chosen, symbol)) if one is not None]
+            price = min(known).limit_denominator(PRECISION) if known else None
+            forgone.append(Forgone(fact, self.weights[symbol], price, wanted))
         bound = None if least is None else float(min(least - self.unmet(kept), cost))
         return self.task(kept), replace(outcome, forgone=tuple(forgone), bound=bound)
 
@@ -277,4 +322,4 @@ class _SoftGoalChoices:
         if self.cost(other) is None:
             return None
         found = self.briefly if other in self.briefly else self.outcomes
-        return (self.price(found[other]) - self.price(found[chosen])).limit_denominator(PRECISION)
+        return self.price(found[other]) - self.price(found[chosen])

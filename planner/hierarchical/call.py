@@ -105,11 +105,13 @@ class Call:
         assert found.plan is not None
         steps = [self.refiner.replay_checked(step) for step in as_refined(self, found.plan.steps)]
         applied = [step for step in steps if step is not None]
-        if len(applied) < len(steps) or not all(map(self.met, self.goal)):
+        if len(applied) < len(steps):
             self.table.undo(0)
             return False
-        self.steps, self.given_up, self.kept = applied, list(found.given_up), dict(self.goal)
+        self.steps, self.given_up = applied, list(found.given_up)
+        self.kept = {cell: value for cell, value in self.goal.items() if self.met(cell)}
         self.space.worked = found.effort
+        self.space.most_work += found.effort
         self.count(found)
         return True
 

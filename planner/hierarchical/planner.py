@@ -89,7 +89,8 @@ def plan(
     advised : function of a call, optional
         Function that attaches advice to the call.
     first : Outcome, optional
-        The outcome of an earlier call for the same problem; its plan is shortened instead of searching for a first plan.
+        The outcome of an earlier call for the same problem, perhaps with fewer goals. Instead of searching for a first plan, the
+        planner extends the plan of this outcome by steps for the other goals; it gives up if a quick search finds none.
 
     Returns
     -------
@@ -126,7 +127,11 @@ def _plan(
     levels = call.program.levels if leave_levels else call.program.levels[:1]
     agenda = Agenda(call, levels, below=partial(below, call, limits) if leave_levels else None)
     try:
-        done = (first is not None and call.resume(first)) or (one_level and by_rules_alone(call))
+        resumed = first is not None and call.resume(first)
+        more = resumed and call.kept.keys() != call.goal.keys()
+        if more and not Agenda(call, levels, quickly=True, trial=True).achieve_all():
+            return call.outcome(Status.GAVE_UP, reason=Reason("a quick search found no steps that extend the plan"))
+        done = resumed or (one_level and by_rules_alone(call))
         if one_level and not done:
             flat = flat or flat_first(problem, limits, deadline)
             call.count(flat)
