@@ -59,24 +59,24 @@ class SuccessorTree:
     def _branch(self) -> None:
         """Distribute the waiting operators over subtrees.
 
-        The node tests the symbol that the first waiting operator tests next.
+        The node tests the symbol that the first waiting operator tests next. A chain of further nodes tests the next symbols of
+        the other operators.
         """
-        masks, others = self.masks, []
-        by_value: dict[int, list[Waiting]] = {}
-        for one in self.waiting:
-            operator, bits, asked = one
+        masks = self.masks
+        tests: dict[int, dict[int, list[Waiting]]] = {}
+        for operator, bits, asked in self.waiting:
             if asked == len(bits):
                 self.operators.append(operator)
-                continue
-            bit = bits[asked]
-            self.mask = self.mask or masks[bit]
-            if masks[bit] == self.mask:
-                by_value.setdefault(1 << bit, []).append((operator, bits, asked + 1))
             else:
-                others.append(one)
-        self.by_value = {value: SuccessorTree(masks, waiting) for value, waiting in by_value.items()}
-        self.otherwise = SuccessorTree(masks, others) if others else None
+                bit = bits[asked]
+                tests.setdefault(masks[bit], {}).setdefault(bit, []).append((operator, bits, asked + 1))
         self.waiting = []
+        node = self
+        for mask, by_bit in tests.items():
+            if node.mask:
+                node.otherwise = node = SuccessorTree(masks, [])
+            node.mask = mask
+            node.by_value = {1 << bit: SuccessorTree(masks, waiting) for bit, waiting in by_bit.items()}
 
 
 def tree(starts: Ints, items: Ints, masks: Sequence[int]) -> SuccessorTree:

@@ -6,6 +6,7 @@ import math
 import random
 from collections.abc import Callable
 from dataclasses import replace
+from time import process_time
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from confab.planner.grounded.lookahead import ahead
 from confab.planner.grounded.novelty import Novelty
 from confab.planner.grounded.plan_windows import regrouped, shortened, shorter
 from confab.planner.grounded.shortest import Cheapest, nothing
+from confab.planner.grounded.successors import tree
 from confab.planner.grounded.task import Task
 from confab.planner.hierarchical import planner as fast
 from confab.planner.hierarchical.agenda import Agenda
@@ -288,6 +290,16 @@ def test_a_lookahead_drives_back_for_the_remaining_goals() -> None:
     assert state & task.goal == task.goal
     assert task.carried_out(task.initial, path) == (state, path)
     assert len(path) <= 4 * 12 + 1  # one parcel at a time, there and back
+
+
+def test_the_tree_of_many_operators_with_a_symbol_each_grows_with_their_number() -> None:
+    def seconds(number: int) -> float:
+        applicable = tree(np.arange(number + 1), np.arange(number), [1 << bit for bit in range(number)])
+        began = process_time()
+        assert applicable.of(1 << 7)[0] == [7]
+        return process_time() - began
+
+    assert seconds(20_000) < 40 * max(seconds(2_000), 0.01)
 
 
 def test_a_lookahead_replaces_a_step_that_is_not_applicable() -> None:
