@@ -29,6 +29,7 @@ from confab.planner.grounded.task import Task
 from confab.planner.plan import OUT_OF_MEMORY, Counts, Limits, Outcome, Plan, Reason, Status, Step, UngroundableError
 from confab.planner.timed.activities import EventKind, StepEvent
 from confab.planner.timed.call import Timed, in_time
+from confab.planner.timed.envelopes import dominated, excluding, oversized
 from confab.planner.timed.pieces import duration_of
 from confab.planner.validation import LoggedState
 from confab.reasoner.language import walk
@@ -39,6 +40,7 @@ from confab.reasoner.symbols import (
     AmountEffect,
     Behavior,
     Effect,
+    Fact,
     Problem,
     SituationType,
     Span,
@@ -220,6 +222,10 @@ def _behavior(behavior: Behavior, name: str, conditions: Sequence[object], effec
     )
 
 
+def _runs(fact: Fact) -> bool:
+    return fact.symbol.situation.endswith(RUNNING)
+
+
 @dataclass(frozen=True)
 class _SnapAction:
     """An event: the number of its step, whether the step begins or ends, and the symbols that are read and changed."""
@@ -268,11 +274,9 @@ class _Finder:
         self.unit = Fraction(1, lcm(self.separation.denominator, *(s.denominator for s in seconds)))
         self.lasts = [int(s / self.unit) for s in seconds]
         self.apart = int(self.separation / self.unit)
-        self.marks = sum(
-            1 << bit
-            for bit, fact in enumerate(self.task.facts)
-            if fact.symbol.situation.endswith(RUNNING) and fact.value == TRUE
-        )
+        self.marks = sum(1 << bit for bit, fact in enumerate(self.task.facts) if _runs(fact) and fact.value == TRUE)
+        self.ends = [self.ending(one) if name.endswith(BEGIN) else None for one, (name, _) in enumerate(self.named)]
+        self.oversized = oversized(self.task, self.ends, self.lasts, self.apart, self.held)
 
     def _seconds(self, name: str, arguments: tuple[str, ...]) -> Fraction:
         whole = self.cut.whole
@@ -286,14 +290,18 @@ class _Finder:
         return LoggedState(self.cut.whole, self.cut.whole.initial)
 
     def without_durations(self, limits: Limits) -> Iterator[list[int]]:
-        """Yield a sequence of operators from a search that ignores durations, if the search finds a plan.
+        """Yield sequences of operators from searches that ignore durations. No step is running at the end of a sequence.
 
-        No step is running at the end of the sequence.
+        The first search uses only the longest of several steps that differ only in their durations.
         """
-        first = search(self.task, limits, limits.end(FIRST))
-        self.counts.add(first.counts)
-        if first.status is Status.SOLVED and (whole := self.completed(list(first.plan))) is not None:
-            yield whole
+        running = self.marks | sum(1 << bit for bit, fact in self.task.complements.items() if _runs(fact))
+        shorter = dominated(self.task, self.ends, self.lasts, running)
+        for never in (shorter, set[int]()) if shorter else (shorter,):
+            task = excluding(self.task, never | self.oversized, running)
+            first = search(task, limits, limits.end(FIRST))
+            self.counts.add(first.counts)
+            if first.status is Status.SOLVED and (whole := self.completed(list(first.plan))) is not None:
+                yield whole
 
     def ending(self, operator: int) -> int | None:
         """Return the operator that ends the step begun by the given operator, or None if the step can't end."""

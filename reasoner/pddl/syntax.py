@@ -247,8 +247,16 @@ class _Reader:
                 raise self.fail(one.place, f"type '{one.name}' is above itself")
 
     def objects(self, items: Sequence[PddlWord | Form]) -> None:
-        """Parse object declarations. If an object is declared with a type and with its subtype, the object has the subtype."""
+        """Parse object declarations.
+
+        If an object is declared with a type and with its subtype, the object has the subtype. An object of type ``(either a b)``
+        belongs to `a` and to `b`.
+        """
         for one in self.typed(items):
+            if one.type.startswith("either "):
+                kinds = tuple(one.type.split()[1:])
+                one = replace(one, type=f"all {' '.join(kinds)}")
+                self.pddl.types.setdefault(one.type, kinds)
             known = self.pddl.objects.get(one.name, one.type)
             if one.type not in self.pddl.above(known) and known not in self.pddl.above(one.type):
                 raise self.fail(one.place, f"'{one.name}' is declared as {known} and as {one.type}")

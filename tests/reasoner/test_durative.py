@@ -41,6 +41,23 @@ WAY = """(define (problem way) (:domain truck) (:objects t u - truck x y - place
   (:init (at t x) (at u x) (road x y) (= (length x y) 12) (= (speed t) 4) (= (speed u) 3) (at 10 (open y)))
   (:goal (and (at t y) (at u y))))"""
 
+BAKERY = """(define (domain bakery) (:requirements :typing :durative-actions)
+  (:types short long - oven loaf) (:predicates (hot ?o - oven) (baked ?l - loaf) (packed ?k ?l - loaf))
+  (:durative-action warm :parameters (?o - short) :duration (= ?duration 4)
+    :condition () :effect (and (at start (hot ?o)) (at end (not (hot ?o)))))
+  (:durative-action heat :parameters (?o - long) :duration (= ?duration 12)
+    :condition () :effect (and (at start (hot ?o)) (at end (not (hot ?o)))))
+  (:durative-action bake :parameters (?l - loaf ?o - oven) :duration (= ?duration 9)
+    :condition (over all (hot ?o)) :effect (at end (baked ?l)))
+  (:durative-action pack :parameters (?k ?l - loaf ?o - oven) :duration (= ?duration 1)
+    :condition (and (over all (baked ?k)) (over all (baked ?l)) (over all (hot ?o))) :effect (at end (packed ?k ?l))))"""
+
+
+def loaves(number: int, ovens: str) -> str:
+    every = [f"l{i}" for i in range(number)]
+    goals = " ".join(f"(packed {a} {b})" for a, b in zip(every[::2], every[1::2], strict=True))
+    return f"(define (problem p) (:domain bakery) (:objects {ovens} {' '.join(every)} - loaf) (:init) (:goal (and {goals})))"
+
 
 def planned(found: Imported) -> TimedPlan:
     problem = found.problem
@@ -78,6 +95,33 @@ def test_fuses_are_repaired_while_a_match_burns() -> None:
     assert only_during(found.problem) == {"STRIKE"}
     assert 6 < timed.makespan < 7  # three fuses and one hand
     assert accepted(CELLAR, FUSES, found, timed)
+
+
+def test_a_step_that_is_too_long_for_one_envelope_runs_in_a_longer_one() -> None:
+    problem = loaves(4, "a b - short c - long")
+    found = imported(parse(BAKERY, problem))
+    timed = planned(found)
+    assert {slot.step.behavior for slot in timed.slots} == {"HEAT", "BAKE", "PACK"}
+    assert accepted(BAKERY, problem, found, timed)
+
+
+def test_steps_that_differ_only_in_their_duration_give_way_to_the_longest_of_them() -> None:
+    """An object of a type (either a b) belongs to both types."""
+    timed = planned(imported(parse(BAKERY, loaves(4, "a - (either short long)"))))
+    assert [slot.step.behavior for slot in timed.slots if slot.step.behavior in ("WARM", "HEAT")] == ["HEAT"]
+
+
+def test_a_value_that_no_step_gives_for_long_enough_is_out_of_reach() -> None:
+    problem = imported(parse(BAKERY, loaves(2, "a - short"))).problem
+    outcome, timed = concurrent.plan(problem, Limits(seconds=5.0), EPSILON)
+    assert outcome.status.value == "gave-up" and timed.plan is None
+
+
+def test_sixty_loaves_are_baked_and_packed_at_the_same_time() -> None:
+    problem = loaves(60, "c - long")
+    found = imported(parse(BAKERY, problem))
+    timed = planned(found)
+    assert timed.makespan == 12 and accepted(BAKERY, problem, found, timed)
 
 
 def test_a_duration_is_calculated_and_a_timed_initial_fact_is_awaited() -> None:
