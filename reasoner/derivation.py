@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from confab.reasoner.amounts import situations_in
+from confab.reasoner.closure import closure
 from confab.reasoner.language import groups
 from confab.reasoner.symbols import (
     FALSE,
@@ -56,10 +57,7 @@ def needed(conditions: Sequence[Condition], negated: bool = False) -> Iterator[t
 
 def strata(rules: Mapping[str, Sequence[Rule]]) -> list[tuple[str, ...]]:
     """Return the groups of mutually dependent derived situation types, in order of dependency."""
-    needs = {
-        name: {s for rule in its for s, _ in needed(rule.conditions)} & rules.keys() for name, its in rules.items()
-    }
-    below = {name: _closure(name, needs) for name in rules}
+    below = _below(rules)
     groups = {
         name: tuple(other for other in rules if other == name or (other in below[name] and name in below[other]))
         for name in rules
@@ -69,10 +67,15 @@ def strata(rules: Mapping[str, Sequence[Rule]]) -> list[tuple[str, ...]]:
 
 def circular(rules: Mapping[str, Sequence[Rule]]) -> set[str]:
     """Return the situation types that depend on themselves, directly or indirectly."""
+    return {name for name, below in _below(rules).items() if name in below}
+
+
+def _below(rules: Mapping[str, Sequence[Rule]]) -> dict[str, set[str]]:
+    """Return the derived situation types on which each derived situation type depends, directly or indirectly."""
     needs = {
         name: {s for rule in its for s, _ in needed(rule.conditions)} & rules.keys() for name, its in rules.items()
     }
-    return {name for name in rules if name in _closure(name, needs)}
+    return {name: closure(needs[name], needs.__getitem__) for name in rules}
 
 
 def circles(rules: Mapping[str, Sequence[Rule]]) -> list[tuple[str, str]]:
@@ -87,14 +90,3 @@ def circles(rules: Mapping[str, Sequence[Rule]]) -> list[tuple[str, str]]:
             if negated and other in together[name]
         }
     )
-
-
-def _closure(name: str, needs: Mapping[str, set[str]]) -> set[str]:
-    found: set[str] = set()
-    waiting = list(needs[name])
-    while waiting:
-        other = waiting.pop()
-        if other not in found:
-            found.add(other)
-            waiting += needs[other]
-    return found

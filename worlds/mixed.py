@@ -19,6 +19,7 @@ from typing import Any
 
 from confab.reasoner.aggregates.dependencies import read_by
 from confab.reasoner.amounts import Amount, Quantity, bounds, written
+from confab.reasoner.closure import closure
 from confab.reasoner.derivation import TASK, circular
 from confab.reasoner.symbols import (
     FALSE,
@@ -285,13 +286,10 @@ def _sayable(value: Any) -> bool:
 
 def _recursive(aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]]) -> bool:
     """Return whether an aggregate depends on a recursively defined situation type."""
-    waiting, seen = list(read_by(aggregate)), set[str]()
-    while waiting:
-        name = waiting.pop()
-        if name not in seen and name in rules:
-            seen.add(name)
-            waiting += [s for rule in rules[name] for s in named(rule.conditions)]
-    return bool(seen & circular(rules))
+    needs = closure(
+        read_by(aggregate), lambda name: (s for rule in rules.get(name, ()) for s in named(rule.conditions))
+    )
+    return not needs.isdisjoint(circular(rules))
 
 
 class _Draft(Vocabulary):

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import count
 
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, inside, situations_in
+from confab.reasoner.closure import closure
 from confab.reasoner.derivation import circular
 from confab.reasoner.language import DomainError, situations_of, walk
 from confab.reasoner.symbols import (
@@ -56,14 +57,13 @@ def read_by(aggregate: Aggregate) -> frozenset[str]:
 
 def _followed(situations: frozenset[str], rules: Mapping[str, Sequence[Rule]]) -> set[str]:
     """Return situation types together with all types on which their definitions depend."""
-    found, waiting = set[str](), [*situations]
-    while waiting:
-        name = waiting.pop()
-        if name not in found:
-            found.add(name)
-            named = (c for rule in rules.get(name, ()) for one in rule.conditions for c in walk(one))
-            waiting += (s for condition in named for s in situations_of(condition))
-    return found
+
+    def named(name: str) -> Iterator[str]:
+        return (
+            s for rule in rules.get(name, ()) for one in rule.conditions for c in walk(one) for s in situations_of(c)
+        )
+
+    return closure(situations, named)
 
 
 def unfolded(aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]]) -> Aggregate:

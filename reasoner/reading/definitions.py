@@ -29,6 +29,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from confab.reasoner.amounts import Amount, Expression, Measure, exact
+from confab.reasoner.closure import closure
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.names import Names, local_name
 from confab.reasoner.symbols import (
@@ -128,16 +129,7 @@ class Definitions:
     def recursive(self) -> frozenset[str]:
         """The classes whose definitions refer to themselves, directly or through other classes."""
         names = {iri: self._mentioned(iri) for iri, node in self.nodes.items() if not _blank(iri) and _DEFINED in node}
-        found = set()
-        for iri in names:
-            waiting, seen = [iri], set[str]()
-            while waiting:
-                new = names[waiting.pop()] & names.keys() - seen
-                seen |= new
-                waiting += new
-            if iri in seen:
-                found.add(iri)
-        return frozenset(found)
+        return frozenset(iri for iri in names if iri in closure(names[iri], lambda each: names.get(each, ())))
 
     @cached_property
     def _changing(self) -> frozenset[str]:

@@ -8,6 +8,7 @@ from itertools import chain
 
 import pyoxigraph as ox
 
+from confab.reasoner.closure import closure
 from confab.reasoner.condition_nodes import NodeValues
 from confab.reasoner.graph.knowledge import SCENE, KnowledgeGraph, text
 from confab.reasoner.limits import checked
@@ -88,12 +89,7 @@ class Individuals:
 
     def below(self, classes: Iterable[str]) -> set[str]:
         """Return some classes and all their subclasses."""
-        found, waiting = set[str](), [*classes]
-        while waiting:
-            if (kind := waiting.pop()) not in found:
-                found.add(kind)
-                waiting += self.subclasses.get(kind, ())
-        return found
+        return closure(classes, lambda kind: self.subclasses.get(kind, ()))
 
     def members(self) -> list[Member]:
         """Return a row for each class of each individual that has been read: individual, class, and index of the individual."""

@@ -9,6 +9,7 @@ from typing import ClassVar
 
 from confab.reasoner.afterwards import closed
 from confab.reasoner.amounts import OPERATIONS, Amount, Expression, Measure, terms_of
+from confab.reasoner.closure import closure
 from confab.reasoner.condition_nodes import NodeReader, NodeValues
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.language import groups, mentions
@@ -373,20 +374,17 @@ class Parts(NodeReader):
 
     def terms_below(self, iri: str) -> set[str]:
         """Return all terms in the parts of a behaviour or rule, except the terms that a witness binds."""
-        found: set[str] = set()
-        bound: set[str] = set()
-        waiting, seen = [iri], {iri}
-        while waiting:
-            node = waiting.pop()
-            bound.update(self.values(node, "witness"))
-            for values in self.nodes.get(node, {}).values():
-                for value in values:
-                    if value in self.terms:
-                        found.add(value)
-                    elif value in self.nodes and value not in seen and _is_part(self.nodes[value]):
-                        seen.add(value)
-                        waiting.append(value)
-        return found - bound
+
+        def mentioned(node: str) -> list[str]:
+            return [value for values in self.nodes.get(node, {}).values() for value in values]
+
+        def parts(node: str) -> list[str]:
+            inner = (value for value in mentioned(node) if value not in self.terms)
+            return [value for value in inner if value in self.nodes and _is_part(self.nodes[value])]
+
+        nodes = closure([iri], parts)
+        bound = {term for node in nodes for term in self.values(node, "witness")}
+        return {value for node in nodes for value in mentioned(node) if value in self.terms} - bound
 
 
 def _plain(condition: Condition) -> bool:

@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 
 from confab.reasoner.aggregates.dependencies import read_by
 from confab.reasoner.aggregates.remembering import in_order_of_update
+from confab.reasoner.closure import closure
 from confab.reasoner.derivation import circular, needed
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.names import Names, local_name
@@ -172,20 +173,13 @@ def remembers_in_order(domain: Domain, names: Names) -> dict[str, str]:
         A remembered situation type depends on itself or on a recursive definition.
     """
     for name, source in domain.remembers.items():
-        seen, waiting = set[str](), [source]
-        while waiting:
-            other = waiting.pop()
-            if other == name:
-                raise KnowledgeError(
-                    f"{name} remembers {source}, which depends on {name}; take {name} out of the definition of {source}",
-                    names.iri(name),
-                )
-            if other not in seen:
-                seen.add(other)
-                read = {s for rule in domain.rules.get(other, ()) for s, _ in needed(rule.conditions)}
-                read |= read_by(domain.aggregates[other]) if other in domain.aggregates else set()
-                waiting += [*read, *([domain.remembers[other]] if other in domain.remembers else [])]
-        if seen & circular(domain.rules):
+        read = closure([source], lambda situation: _needed(domain, situation))
+        if name in read:
+            raise KnowledgeError(
+                f"{name} remembers {source}, which depends on {name}; take {name} out of the definition of {source}",
+                names.iri(name),
+            )
+        if read & circular(domain.rules):
             raise KnowledgeError(
                 f"{name} remembers {source}, which depends on a recursive definition; remember a situation type without a "
                 "recursive definition",
@@ -193,3 +187,10 @@ def remembers_in_order(domain: Domain, names: Names) -> dict[str, str]:
             )
     order = [one.situation for one in in_order_of_update(domain)]
     return {name: domain.remembers[name] for name in order if name in domain.remembers}
+
+
+def _needed(domain: Domain, situation: str) -> set[str]:
+    """Return the situation types on which a situation type depends directly."""
+    read = {s for rule in domain.rules.get(situation, ()) for s, _ in needed(rule.conditions)}
+    read |= read_by(domain.aggregates[situation]) if situation in domain.aggregates else set()
+    return read | ({domain.remembers[situation]} if situation in domain.remembers else set())

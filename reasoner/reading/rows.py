@@ -7,12 +7,13 @@ from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import chain
 
 import pyoxigraph as ox
 
 from confab.reasoner.amounts import exact, written
+from confab.reasoner.closure import closure
 from confab.reasoner.condition_nodes import NodeValues
 from confab.reasoner.graph.knowledge import KnowledgeError, Term, text
 from confab.reasoner.limits import checked
@@ -231,23 +232,15 @@ def classes_of(
     instances: Sequence[Member], supers: Mapping[str, Sequence[str]], names: Names
 ) -> tuple[dict[str, tuple[str, ...]], dict[str, tuple[str, ...]]]:
     """Return the individuals of each class and its subclasses in declared order, and each class's direct superclasses."""
-    above: dict[str, frozenset[str]] = {}
 
-    def closure(kind: str) -> frozenset[str]:
-        if kind not in above:
-            found, waiting = {kind}, [kind]
-            while waiting:
-                for sup in supers.get(waiting.pop(), ()):
-                    if sup not in found:
-                        found.add(sup)
-                        waiting.append(sup)
-            above[kind] = frozenset(found)
-        return above[kind]
+    @cache
+    def above(kind: str) -> set[str]:
+        return closure([kind], lambda each: supers.get(each, ()))
 
     of: dict[str, set[str]] = defaultdict(set)
     place: dict[str, int] = {}
     for individual, kind, index in checked(instances, "reading the scene"):
-        of[individual] |= closure(kind)
+        of[individual] |= above(kind)
         place[individual] = min(index, place.get(individual, index))
     members: dict[str, list[str]] = {kind: [] for kind in {*supers, *chain.from_iterable(supers.values())}}
     named = [(place[iri], names.short(iri), kinds) for iri, kinds in checked(of.items(), "reading the scene")]

@@ -16,6 +16,7 @@ from typing import Literal
 
 import pyoxigraph as ox
 
+from confab.reasoner.closure import closure
 from confab.reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, load, readable, scene_file, text
 from confab.reasoner.names import local_name
 from confab.reasoner.reading.frame import as_written
@@ -257,15 +258,14 @@ def _joined(file: _File) -> str:
 
 def _parts(iri: str, schema: OntologySchema) -> set[str]:
     """Return the terms, conditions and effects of a behaviour."""
-    found: set[str] = set()
-    waiting = [part for name in LINKS for part in schema.nodes[iri].get(name, ())]
-    while waiting:
-        part = waiting.pop()
-        if part in found or part not in schema.nodes or not (_is_term(part, schema) or _is_said(part, schema)):
-            continue
-        found.add(part)
-        waiting += [v for name, values in schema.nodes[part].items() if name.startswith(CORE) for v in values]
-    return found
+
+    def parts(values: Iterable[str]) -> list[str]:
+        return [v for v in values if v in schema.nodes and (_is_term(v, schema) or _is_said(v, schema))]
+
+    def below(part: str) -> list[str]:
+        return parts(v for name, values in schema.nodes[part].items() if name.startswith(CORE) for v in values)
+
+    return closure(parts(part for name in LINKS for part in schema.nodes[iri].get(name, ())), below)
 
 
 def _is_term(iri: str, schema: OntologySchema) -> bool:

@@ -7,6 +7,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence, Set
 
 from confab.reasoner.amounts import terms_of
+from confab.reasoner.closure import closure
 from confab.reasoner.language import mentions
 from confab.reasoner.sentences import said
 from confab.reasoner.symbols import (
@@ -219,11 +220,7 @@ def _given(behavior: Behavior, problem: Problem) -> set[tuple[str, str]]:
 
 def _reached(name: str, needs: Mapping[str, Set[str]]) -> set[str]:
     """Return the behaviours that a behaviour needs, directly or indirectly."""
-    found, left = set[str](), [name]
-    while left:
-        left += (more := {*needs.get(left.pop(), ())} - found)
-        found |= more
-    return found
+    return closure(needs.get(name, ()), lambda each: needs.get(each, ()))
 
 
 def _first(needs: Mapping[str, Set[str]]) -> Iterator[set[str]]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from confab.reasoner.amounts import COMPARING, Amount
+from confab.reasoner.closure import closure
 from confab.reasoner.language import groups
 from confab.reasoner.possible import against_physics
 from confab.reasoner.sentences import said
@@ -231,11 +232,7 @@ def _inside_negated(condition: Condition, negated: bool) -> Iterator[_Inner]:
 
 
 def _below(kind: str, other: str, problem: Problem) -> bool:
-    found, waiting = {kind}, [kind]
-    while waiting:
-        waiting += (more := {*problem.parents.get(waiting.pop(), ())} - found)
-        found |= more
-    return other in found
+    return other in closure([kind], lambda each: problem.parents.get(each, ()))
 
 
 def impossible_situations(case: Case) -> Iterator[Fault]:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence, Set
 
 import pyoxigraph as ox
 
+from confab.reasoner.closure import closure
 from confab.reasoner.condition_nodes import NodeValues
 from confab.reasoner.derivation import needed
 from confab.reasoner.names import local_name
@@ -116,11 +117,7 @@ def defined(case: Case) -> Iterator[Fault]:
     for name in domain.rules:
         if name in names and names.iri(name) not in case.reading.schema.nodes:
             continue  # a situation type that expresses a constraint on several states
-        below, waiting = {name}, [name]
-        while waiting:
-            waiting += (more := reads.get(waiting.pop(), set()) - below)
-            below |= more
-        if below & changed:
+        if closure([name], lambda each: reads.get(each, ())) & changed:
             what = f"{name} is derived: in every state it follows from {' and '.join(sorted(reads[name] - {name}))}"
             why = "planning derives it in each state from its definition; no behaviour changes it"
             yield names.iri(name), what, why, "nothing"
@@ -179,13 +176,11 @@ def both(case: Case, one: str, other: str) -> bool:
     problem = case.reading.problem
     if {*problem.classes.get(one, ())} & {*problem.classes.get(other, ())}:
         return True
-    below = []
-    for kinds in (one.split("|"), other.split("|")):
-        found = {*kinds}
-        while more := {sub for sub, above in problem.parents.items() if not found.isdisjoint(above)} - found:
-            found |= more
-        below.append(found)
-    return not below[0].isdisjoint(below[1])
+
+    def below(kind: str) -> set[str]:
+        return closure(kind.split("|"), lambda each: (sub for sub, above in problem.parents.items() if each in above))
+
+    return not below(one).isdisjoint(below(other))
 
 
 NOT_ENFORCED = {
@@ -243,36 +238,28 @@ def axioms_not_watched(case: Case) -> Iterator[Fault]:
 
 def _properties_in(node: object, inside: Mapping[object, Sequence[ox.Triple]]) -> set[str]:
     """Return the properties in the restrictions of a class expression."""
-    found, waiting, seen = set[str](), [node], set[object]()
-    while waiting:
-        if not isinstance(one := waiting.pop(), ox.BlankNode) or one in seen:
-            continue
-        seen.add(one)
-        for triple in inside.get(one, ()):
-            waiting.append(triple.object)
-            if triple.predicate.value == OWL + "onProperty" and isinstance(triple.object, ox.NamedNode):
-                found.add(triple.object.value)
-    return found
+
+    def parts(node: object) -> Iterator[object]:
+        return (triple.object for triple in inside.get(node, ()) if isinstance(triple.object, ox.BlankNode))
+
+    return {
+        triple.object.value
+        for part in closure([node], parts)
+        for triple in inside.get(part, ())
+        if triple.predicate.value == OWL + "onProperty" and isinstance(triple.object, ox.NamedNode)
+    }
 
 
 def _above(case: Case, iri: str) -> set[str]:
     """Return the classes that contain every member of a defined class: the conjuncts of its definition and their superclasses."""
     assert case.reading is not None
-    schema, found = case.reading.schema, {OWL + "Thing"}
-    waiting = [iri]
-    while waiting:
-        for node in schema.expressions.get(waiting.pop(), {}).get(OWL + "equivalentClass", ()):
-            parts = [node, *_items(schema.expressions, node)]
-            for part in (part for part in parts if ":" in part and part not in found):
-                found.add(part)
-                waiting.append(part)
-    above = list(found)
-    while above:
-        for kind in schema.supers.get(above.pop(), ()):
-            if kind not in found:
-                found.add(kind)
-                above.append(kind)
-    return found
+    schema = case.reading.schema
+
+    def conjuncts(kind: str) -> Iterator[str]:
+        for node in schema.expressions.get(kind, {}).get(OWL + "equivalentClass", ()):
+            yield from (part for part in (node, *_items(schema.expressions, node)) if ":" in part)
+
+    return closure([*closure(conjuncts(iri), conjuncts), OWL + "Thing"], lambda kind: schema.supers.get(kind, ()))
 
 
 def _items(expressions: Mapping[str, NodeValues], node: str) -> Iterator[str]:

@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING
 import pyoxigraph as ox
 
 from confab import ontology
+from confab.reasoner.closure import closure
 from confab.reasoner.embodiment import joint_checks, measures, skill_checks, solid_checks
 from confab.reasoner.embodiment.facts import EmbodimentError
 from confab.reasoner.embodiment.reading import read_embodiment
@@ -221,10 +222,7 @@ def _in_memory(path: Path, graph: KnowledgeGraph, places: Places) -> Iterator[Fi
 def _extending(graph: KnowledgeGraph, behaviors: set[str]) -> set[str]:
     """Return the given behaviours and all behaviours that extend them, directly or indirectly."""
     pairs = [(text(one), text(other)) for one, other in graph.select("SELECT ?one ?other { ?one :extends ?other }")]
-    found = set(behaviors)
-    while more := {one for one, other in pairs if other in found} - found:
-        found |= more
-    return found
+    return closure(behaviors, lambda extended: (one for one, other in pairs if other == extended))
 
 
 def _merged(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
