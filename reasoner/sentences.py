@@ -79,6 +79,11 @@ def said(condition: Condition, words: Words = str) -> str:
             return denied(sentence) if negated else sentence
 
 
+def plain(condition: Condition) -> str:
+    """Return a condition as a clause with the names of the ontology, and with variables by name."""
+    return said(condition).replace("?", "")
+
+
 def _sought(variable: str, kind: str, conditions: Sequence[Condition], negated: bool, words: Words) -> str:
     """Return the clause "some, no, or every individual of a class satisfies the conditions" in words.
 

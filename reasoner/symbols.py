@@ -28,6 +28,7 @@ from math import prod
 from typing import Protocol, TypeAlias
 
 from confab.reasoner.amounts import OPERATIONS, Amount, Calculation, Expression, Quantity, put_in, situations_in
+from confab.reasoner.closure import closure
 from confab.reasoner.names import brief, known_as
 
 TRUE = "true"
@@ -645,6 +646,10 @@ class Problem:
     def members(self, kind: str) -> frozenset[str]:
         """Return the members of a class as a set."""
         return self._members.get(kind, frozenset())
+
+    def superclasses(self, kind: str) -> set[str]:
+        """Return a class with all its superclasses."""
+        return closure([kind], lambda each: self.parents.get(each, ()))
 
     @cached_property
     def individuals(self) -> frozenset[str]:

@@ -18,7 +18,6 @@ from confab.planner.timed.activities import InapplicableError, StepSimulation
 from confab.planner.timed.pieces import SECOND
 from confab.planner.validation import successor
 from confab.reasoner.aggregates.totals import following
-from confab.reasoner.closure import closure
 from confab.reasoner.possible import PLACE, refuse_impossible
 from confab.reasoner.symbols import Problem, State, Symbol, spread_to
 
@@ -289,7 +288,7 @@ def _is_whereabouts(problem: Problem, situation: str) -> bool:
 
 def with_individual(problem: Problem, individual: str, kind: str) -> Problem:
     """Return the problem with an individual that comes last in each of its classes, and to which effects on the classes apply."""
-    kinds = closure([kind], lambda each: problem.parents.get(each, ()))
+    kinds = problem.superclasses(kind)
     classes = {
         name: (*members, individual) if name in kinds and individual not in members else members
         for name, members in problem.classes.items()

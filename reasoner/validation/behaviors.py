@@ -9,7 +9,8 @@ from collections.abc import Iterator, Mapping, Sequence, Set
 from confab.reasoner.amounts import terms_of
 from confab.reasoner.closure import closure
 from confab.reasoner.language import mentions
-from confab.reasoner.sentences import said
+from confab.reasoner.reading.goals import some_of
+from confab.reasoner.sentences import plain
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -25,7 +26,7 @@ from confab.reasoner.symbols import (
     substituted,
 )
 from confab.reasoner.timing import timing_of
-from confab.reasoner.validation.case import Case, Fault
+from confab.reasoner.validation.case import Fault, ReadCase
 from confab.reasoner.validation.contradictions import dead
 from confab.reasoner.validation.quantities import some
 
@@ -35,14 +36,10 @@ EVERY_OTHER = re.compile(r"\?each\d")
 """Pattern of the names of variables that stand for the members of another class in a condition."""
 
 
-def undetermined_variables(case: Case) -> Iterator[Fault]:
+def undetermined_variables(case: ReadCase) -> Iterator[Fault]:
     """Find variables in effects or negated conditions that no positive condition determines."""
-    if case.reading is None:
-        return
-    domain = case.reading.problem.domain
-    rules = [(name, rule.behavior) for name, its in domain.rules.items() for rule in its]
-    for name, behavior in (*domain.behaviors.items(), *rules):
-        node = case.reading.names.iri(name)
+    for name, behavior in case.behaviors_and_rules:
+        node = case.names.iri(name)
         bound = {parameter.name for parameter in behavior.parameters}
         free = _undetermined(behavior.preconditions, bound)
         for effect in behavior.every_effect:
@@ -85,14 +82,12 @@ def _undetermined(conditions: Sequence[Condition], bound: set[str]) -> set[str]:
     return free
 
 
-def other_kinds_in_when(case: Case) -> Iterator[Fault]:
+def other_kinds_in_when(case: ReadCase) -> Iterator[Fault]:
     """Find effects on all members of one class whose conditions `when` concern all members of another class.
 
     Only classes that have common members are reported.
     """
-    if case.reading is None:
-        return
-    problem = case.reading.problem
+    problem = case.problem
     for name, behavior in problem.domain.behaviors.items():
         for effect in behavior.every_effect:
             for condition in effect.when:
@@ -101,7 +96,7 @@ def other_kinds_in_when(case: Case) -> Iterator[Fault]:
                 kind = condition.kind
                 if problem.members(kind) & {*effect.arguments}:
                     yield (
-                        case.reading.names.iri(name),
+                        case.names.iri(name),
                         f"{name} changes {effect.situation} of all individuals of a class, under a condition on all "
                         f"individuals of {kind}",
                         "in c:when, the effect's class denotes the changed individual, but another class denotes all of its "
@@ -111,11 +106,9 @@ def other_kinds_in_when(case: Case) -> Iterator[Fault]:
                     )
 
 
-def every_member_required(case: Case) -> Iterator[Fault]:
+def every_member_required(case: ReadCase) -> Iterator[Fault]:
     """Find behaviours that change all members of a class, and have a precondition on all members of the same class."""
-    if case.reading is None:
-        return
-    problem = case.reading.problem
+    problem = case.problem
     for name, behavior in problem.domain.behaviors.items():
         changed = {argument for effect in behavior.every_effect for argument in effect.arguments}
         for condition in behavior.preconditions:
@@ -124,7 +117,7 @@ def every_member_required(case: Case) -> Iterator[Fault]:
             members = problem.members(condition.kind)
             if len(members) > 1 and members <= changed:
                 yield (
-                    case.reading.names.iri(name),
+                    case.names.iri(name),
                     f"{name} changes all individuals of {condition.kind}, and is applicable only if a condition holds of all of "
                     "them",
                     "a class in a precondition, or in the WHERE of the first operation of an update, denotes all of its "
@@ -134,15 +127,15 @@ def every_member_required(case: Case) -> Iterator[Fault]:
                 )
 
 
-def unreachable_behaviors(case: Case) -> Iterator[Fault]:
+def unreachable_behaviors(case: ReadCase) -> Iterator[Fault]:
     """Find values that behaviours or goals require, although they are neither initial values nor values of an effect.
 
     If a value is unreachable only because another value is unreachable, one finding reports both values. A behaviour for which
     the scene has no objects isn't reported, because the behaviour belongs to other scenes.
     """
-    if case.reading is None or not case.reading.problem.initial:
+    if not case.problem.initial:
         return
-    problem, names = case.reading.problem, case.reading.names
+    problem, names = case.problem, case.names
     contradictory = dead(problem)
     there = _there_at_first(problem)
     waiting = {name: b for name, b in problem.domain.behaviors.items() if name not in contradictory}
@@ -259,17 +252,15 @@ def _individuals(term: str, behavior: Behavior, problem: Problem) -> Sequence[st
 def _words(condition: Condition, behavior: Behavior) -> str:
     """Return a condition in words, with classes substituted for variables."""
     kinds = {term: f"some {kind.replace('|', ' or ')}" for term, kind in behavior.kinds.items()}
-    return said(substituted(condition, kinds)).replace("?", "")
+    return plain(substituted(condition, kinds))
 
 
-def gaps_of_values(case: Case) -> Iterator[Fault]:
+def gaps_of_values(case: ReadCase) -> Iterator[Fault]:
     """Find effects of a level whose value isn't given by any behaviour of the next level.
 
     Effects on situation types that the next level never changes aren't reported.
     """
-    if case.reading is None:
-        return
-    problem, names = case.reading.problem, case.reading.names
+    problem, names = case.problem, case.names
     leads: dict[tuple[int, str], set[str]] = defaultdict(set)
     for behavior in problem.domain.behaviors.values():
         for effect in behavior.effects:
@@ -291,11 +282,9 @@ def gaps_of_values(case: Case) -> Iterator[Fault]:
                 )
 
 
-def crowded_places(case: Case) -> Iterator[Fault]:
+def crowded_places(case: ReadCase) -> Iterator[Fault]:
     """Find individuals that initially share a value, although behaviours give the value only if no individual has it."""
-    if case.reading is None:
-        return
-    problem, names = case.reading.problem, case.reading.names
+    problem, names = case.problem, case.names
     asks: dict[tuple[str, str], set[str]] = {}  # for each value, the classes whose members must not have the value
     for behavior in problem.domain.behaviors.values():
         for effect in behavior.effects:
@@ -314,11 +303,10 @@ def crowded_places(case: Case) -> Iterator[Fault]:
         for kind in sorted(asks[situation, value]):
             several = [one for one in individuals if one in problem.classes.get(kind, ())]
             if len(several) > 1:
-                some = ", ".join(several[:5]) + (", …" if len(several) > 5 else "")
                 yield (
                     names.iri(several[1]),
-                    f"the initial {situation} of {some} is {value}, but behaviours that give this value require that no "
-                    f"{kind} has it yet",
+                    f"the initial {situation} of {some_of(several, 5)} is {value}, but behaviours that give this value require "
+                    f"that no {kind} has it yet",
                     "no behaviour leads to such a situation, so it is probably unintended",
                     f"state another {situation} for all but one of them, or remove that precondition",
                 )

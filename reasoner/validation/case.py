@@ -10,8 +10,10 @@ from functools import cached_property
 import pyoxigraph as ox
 
 from confab.reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph
+from confab.reasoner.names import Names
 from confab.reasoner.reading.problem import Reading
-from confab.reasoner.vocabulary import RDF
+from confab.reasoner.symbols import Behavior, Problem
+from confab.reasoner.vocabulary import CORE, RDF
 
 Fault = tuple[str, str, str, str]
 """A fault: the node at fault, a description, its consequence, and the remedy."""
@@ -19,13 +21,9 @@ Fault = tuple[str, str, str, str]
 
 @dataclass(frozen=True)
 class Case:
-    """Input of a validation rule: the graph, and the planning problem that was read from the graph.
-
-    The problem is None if it can't be read.
-    """
+    """Input of a validation rule: the graph of an ontology."""
 
     graph: KnowledgeGraph
-    reading: Reading | None
 
     @cached_property
     def triples(self) -> Sequence[ox.Triple]:
@@ -51,3 +49,32 @@ class Case:
         """The IRIs that are relative in their file, and therefore depend on the file's folder."""
         parts = (part for triple in self.triples for part in (triple.subject, triple.predicate, triple.object))
         return frozenset(p.value for p in parts if isinstance(p, ox.NamedNode) and p.value.startswith("file:"))
+
+
+@dataclass(frozen=True)
+class ReadCase(Case):
+    """A case with the planning problem that was read from the graph."""
+
+    reading: Reading
+
+    @property
+    def problem(self) -> Problem:
+        """The planning problem."""
+        return self.reading.problem
+
+    @property
+    def names(self) -> Names:
+        """The short names and IRIs of the terms."""
+        return self.reading.names
+
+    @cached_property
+    def units(self) -> dict[str, str]:
+        """The stated units of amounts and of relations to numbers, by short name."""
+        nodes = self.reading.schema.nodes
+        return {self.names.short(iri): unit for iri, node in nodes.items() for unit in node.get(CORE + "unit", ())[:1]}
+
+    @property
+    def behaviors_and_rules(self) -> list[tuple[str, Behavior]]:
+        """The behaviours, and the rules in the form of behaviours, by name; several rules may have one name."""
+        domain = self.problem.domain
+        return [*domain.behaviors.items(), *((name, one.behavior) for name, its in domain.rules.items() for one in its)]

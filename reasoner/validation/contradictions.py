@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from confab.reasoner.amounts import COMPARING, Amount
-from confab.reasoner.closure import closure
 from confab.reasoner.language import groups
 from confab.reasoner.possible import against_physics
-from confab.reasoner.sentences import said
+from confab.reasoner.sentences import plain
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -25,21 +24,18 @@ from confab.reasoner.symbols import (
     ValueCondition,
     Witness,
 )
-from confab.reasoner.validation.case import Case, Fault
+from confab.reasoner.validation.case import Fault, ReadCase
 from confab.reasoner.validation.definitions import both
 
 Clash = tuple[Condition, Condition]
 """Two conditions that no state satisfies together."""
 
 
-def contradictions(case: Case) -> Iterator[Fault]:
+def contradictions(case: ReadCase) -> Iterator[Fault]:
     """Find behaviours, effects and rules with contradictory conditions; an inherited contradiction is reported once."""
-    if case.reading is None:
-        return
-    problem, names = case.reading.problem, case.reading.names
+    problem, names = case.problem, case.names
     told: dict[Clash, str] = {}
-    rules = [(name, rule.behavior) for name, its in problem.domain.rules.items() for rule in its]
-    for name, behavior in (*problem.domain.behaviors.items(), *rules):
+    for name, behavior in case.behaviors_and_rules:
         consequence = (
             "nothing follows from the rule" if name in problem.domain.rules else "the behaviour is never applicable"
         )
@@ -50,7 +46,7 @@ def contradictions(case: Case) -> Iterator[Fault]:
             one, other = clash
             yield (
                 names.iri(name),
-                f"{name} requires{where} both {_plain(one)} and {_plain(other)}",
+                f"{name} requires{where} both {plain(one)} and {plain(other)}",
                 f"no state satisfies both, so {'the effect never happens' if where else consequence}",
                 "remove one of the two conditions, or correct its terms",
             )
@@ -171,10 +167,6 @@ def _apart(one: Comparison, other: Comparison) -> bool:
     )
 
 
-def _plain(condition: Condition) -> str:
-    return said(condition).replace("?", "")
-
-
 # ------------------------------------------------------------------------------------------- redundant conditions
 
 
@@ -186,25 +178,22 @@ class _Inner:
     kind: str
 
 
-def repeated_names(case: Case) -> Iterator[Fault]:
+def repeated_names(case: ReadCase) -> Iterator[Fault]:
     """Find negated conditions with a class condition on a term that is bound outside the negated condition.
 
     The author of the ontology probably meant two different individuals.
     """
-    if case.reading is None:
-        return
-    problem, names = case.reading.problem, case.reading.names
+    problem, names = case.problem, case.names
     told = set[_Inner]()
     maxima = {p.kind for one in problem.domain.aggregates.values() if not one.kept for p in one.parameters}
-    rules = [(name, rule.behavior) for name, its in problem.domain.rules.items() for rule in its]
-    for name, behavior in (*problem.domain.behaviors.items(), *rules):
+    for name, behavior in case.behaviors_and_rules:
         for condition in behavior.conditions:
             for one in _inside_negated(condition, False):
                 outer = behavior.kinds.get(one.term)
                 if outer is None or one in told or one.kind in maxima:
                     continue  # conditions on a maximum or minimum contain such class conditions
                 told.add(one)
-                term, anyway = one.term[1:], _below(outer, one.kind, problem)
+                term, anyway = one.term[1:], one.kind in problem.superclasses(outer)
                 if not anyway and both(case, outer, one.kind):
                     continue
                 yield (
@@ -231,15 +220,9 @@ def _inside_negated(condition: Condition, negated: bool) -> Iterator[_Inner]:
             yield from _inside_negated(inner, negated or condition.negated)
 
 
-def _below(kind: str, other: str, problem: Problem) -> bool:
-    return other in closure([kind], lambda each: problem.parents.get(each, ()))
-
-
-def impossible_situations(case: Case) -> Iterator[Fault]:
+def impossible_situations(case: ReadCase) -> Iterator[Fault]:
     """Find initial states that are physically impossible, and goals that together are physically impossible."""
-    if case.reading is None:
-        return
-    problem, names = case.reading.problem, case.reading.names
+    problem, names = case.problem, case.names
     found = set()
     for fault in against_physics(problem, problem.initial):
         found.add(fault.what)

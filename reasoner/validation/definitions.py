@@ -14,7 +14,7 @@ from confab.reasoner.names import local_name
 from confab.reasoner.reading.definitions import Definitions
 from confab.reasoner.reading.rows import OntologySchema
 from confab.reasoner.symbols import ClassCondition, Domain, Parameter, Rule, ValueCondition
-from confab.reasoner.validation.case import Case, Fault
+from confab.reasoner.validation.case import Fault, ReadCase
 from confab.reasoner.vocabulary import CORE, OWL, RDF, RDFS
 
 AXIOMS_OF_PROPERTIES = {
@@ -30,11 +30,9 @@ NOT_EVALUATED = {
 }
 
 
-def definitions_without_effect(case: Case) -> Iterator[Fault]:
+def definitions_without_effect(case: ReadCase) -> Iterator[Fault]:
     """Find axioms about situation types that planning ignores, and stated facts about derived situation types."""
-    if case.reading is None:
-        return
-    schema, names, rules = case.reading.schema, case.reading.names, case.reading.problem.domain.rules
+    schema, names, rules = case.reading.schema, case.names, case.problem.domain.rules
     of = {
         prop: iri
         for iri in schema.of_kind("SituationType")
@@ -107,11 +105,9 @@ def _unevaluated(schema: OntologySchema, situation: str, prop: str, changed: Set
     return situation, what, why, mend
 
 
-def defined(case: Case) -> Iterator[Fault]:
+def defined(case: ReadCase) -> Iterator[Fault]:
     """Report, for each derived situation type, the changing situation types on which it depends, or that it is static."""
-    if case.reading is None:
-        return
-    domain, names = case.reading.problem.domain, case.reading.names
+    domain, names = case.problem.domain, case.names
     changed = frozenset[str]().union(*(behavior.changes for behavior in domain.behaviors.values()))
     reads = {name: {s for rule in its for s, _ in needed(rule.conditions)} for name, its in domain.rules.items()}
     for name in domain.rules:
@@ -132,11 +128,9 @@ def defined(case: Case) -> Iterator[Fault]:
             )
 
 
-def conclusions_outside_class(case: Case) -> Iterator[Fault]:
+def conclusions_outside_class(case: ReadCase) -> Iterator[Fault]:
     """Find rules whose conclusion is about an individual of a wrong class, for example because of swapped arguments."""
-    if case.reading is None:
-        return
-    domain, names = case.reading.problem.domain, case.reading.names
+    domain, names = case.problem.domain, case.names
     for name, rules in domain.rules.items():
         for rule in rules:
             for parameter, wanted in zip(rule.parameters, domain.situations[name].arguments, strict=True):
@@ -170,10 +164,9 @@ def _asked(rule: Rule, parameter: Parameter, domain: Domain) -> Iterator[str]:
                 pass
 
 
-def both(case: Case, one: str, other: str) -> bool:
+def both(case: ReadCase, one: str, other: str) -> bool:
     """Return whether an individual may belong to two classes (or unions): a common member or a common subclass exists."""
-    assert case.reading is not None
-    problem = case.reading.problem
+    problem = case.problem
     if {*problem.classes.get(one, ())} & {*problem.classes.get(other, ())}:
         return True
 
@@ -190,13 +183,11 @@ NOT_ENFORCED = {
 }
 
 
-def axioms_not_watched(case: Case) -> Iterator[Fault]:
+def axioms_not_watched(case: ReadCase) -> Iterator[Fault]:
     """Find axioms that planning ignores: axioms that restrict every state, and subclass axioms that no definition implies."""
-    if case.reading is None:
-        return
     known = case.reading.schema.expressions
     of = {prop for node in case.reading.schema.nodes.values() for prop in node.get(CORE + "valueProperty", ())}
-    definitions = Definitions(known, dict.fromkeys(of, ("", True)), case.reading.names)
+    definitions = Definitions(known, dict.fromkeys(of, ("", True)), case.names)
     inside: dict[object, list[ox.Triple]] = defaultdict(list)
     for triple in case.triples:
         inside[triple.subject].append(triple)
@@ -250,9 +241,8 @@ def _properties_in(node: object, inside: Mapping[object, Sequence[ox.Triple]]) -
     }
 
 
-def _above(case: Case, iri: str) -> set[str]:
+def _above(case: ReadCase, iri: str) -> set[str]:
     """Return the classes that contain every member of a defined class: the conjuncts of its definition and their superclasses."""
-    assert case.reading is not None
     schema = case.reading.schema
 
     def conjuncts(kind: str) -> Iterator[str]:

@@ -27,14 +27,12 @@ from confab.reasoner.symbols import (
     ValueEffect,
     Witness,
 )
-from confab.reasoner.validation.case import Case, Fault
+from confab.reasoner.validation.case import Fault, ReadCase
 
 
-def values_not_kept_exclusive(case: Case) -> Iterator[Fault]:
+def values_not_kept_exclusive(case: ReadCase) -> Iterator[Fault]:
     """Find behaviours that can give an exclusive value to a second individual."""
-    if case.reading is None:
-        return
-    problem, names = case.reading.problem, case.reading.names
+    problem, names = case.problem, case.names
     for situation in problem.domain.situations.values():
         if situation.perceived is None or not situation.perceived.exclusive or len(situation.arguments) != 1:
             continue
@@ -180,18 +178,20 @@ class _Exclusive:
 
     def leaves(self, excluding: _Taken, behavior: Behavior, effect: ValueEffect) -> bool:
         """Return whether an effect's value is in the state `excluding` before the behaviour and not after the behaviour."""
-        value = effect.value
-        before = any(
-            isinstance(c, ValueCondition)
-            and (c.situation, c.arguments, c.negated) == (excluding.situation, (value,), False)
-            and self.inside(excluding, c.value, behavior)
-            for c in (*behavior.preconditions, *effect.when)
-        )
-        return before and any(
-            (e.situation, e.arguments) == (excluding.situation, (value,))
+        return self.before(excluding, effect.value, behavior, effect) and any(
+            (e.situation, e.arguments) == (excluding.situation, (effect.value,))
             and {*e.when} <= {*effect.when}
             and not self.may_be_inside(excluding, e.value, behavior)
             for e in behavior.effects
+        )
+
+    def before(self, excluding: _Taken, about: str, behavior: Behavior, effect: ValueEffect) -> bool:
+        """Return whether the conditions of an effect require that an object is in the state `excluding`."""
+        return any(
+            isinstance(c, ValueCondition)
+            and (c.situation, c.arguments, c.negated) == (excluding.situation, (about,), False)
+            and self.inside(excluding, c.value, behavior)
+            for c in (*behavior.preconditions, *effect.when)
         )
 
     def breaking(self, excluding: _Taken, behaviors: Sequence[Behavior]) -> Iterator[tuple[Behavior, str]]:
@@ -206,12 +206,7 @@ class _Exclusive:
                 if not self.may_be_inside(excluding, effect.value, behavior):
                     continue
                 (about,) = effect.arguments
-                stays = any(
-                    isinstance(c, ValueCondition)
-                    and (c.situation, c.arguments, c.negated) == (excluding.situation, (about,), False)
-                    and self.inside(excluding, c.value, behavior)
-                    for c in (*behavior.preconditions, *effect.when)
-                )
+                stays = self.before(excluding, about, behavior, effect)
                 let_go = any(
                     self.releases(behavior, effect.when, holder, about)
                     for holder in self.holders(behavior, effect.when, about)
@@ -240,11 +235,4 @@ class _Exclusive:
     def below(self, kind: str, other: str) -> bool:
         """Return whether every individual of a class or union of classes belongs to another class or union."""
         above = {*other.split("|"), other}
-        for part in kind.split("|"):
-            found, waiting = {part}, [part]
-            while waiting:
-                waiting += (more := {*self.problem.parents.get(waiting.pop(), ())} - found)
-                found |= more
-            if found.isdisjoint(above):
-                return False
-        return True
+        return not any(self.problem.superclasses(part).isdisjoint(above) for part in kind.split("|"))

@@ -9,21 +9,15 @@ from math import inf
 
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, exact, inside, situations_in, written
 from confab.reasoner.language import groups, walk
-from confab.reasoner.sentences import counted, said
+from confab.reasoner.reading.goals import some_of
+from confab.reasoner.sentences import counted, plain
 from confab.reasoner.symbols import AmountEffect, Behavior, ClassCondition, Comparison, Condition, Problem, Witness
-from confab.reasoner.validation.case import Case, Fault
-from confab.reasoner.vocabulary import CORE
+from confab.reasoner.validation.case import Fault, ReadCase
 
 
-def unlike_units(case: Case) -> Iterator[Fault]:
+def unlike_units(case: ReadCase) -> Iterator[Fault]:
     """Find amounts with different units that are compared, added or assigned to each other."""
-    if case.reading is None:
-        return
-    reading = case.reading
-    units = {name: s.quantity.unit for name, s in reading.problem.domain.situations.items() if s.quantity}
-    relations = {
-        reading.names.short(iri): node.get(CORE + "unit", [""])[0] for iri, node in reading.schema.nodes.items()
-    }
+    domain, units = case.problem.domain, case.units
 
     def unit(expression: Expression) -> tuple[str, str]:
         """Return the unit of an expression, and a mismatch of units inside the expression.
@@ -31,10 +25,8 @@ def unlike_units(case: Case) -> Iterator[Fault]:
         The unit is empty if the expression has no unit or any unit.
         """
         match expression:
-            case Amount(situation):
-                return units.get(situation, ""), ""
-            case Measure(relation):
-                return relations.get(relation, ""), ""
+            case Amount(name) | Measure(name):
+                return units.get(name, ""), ""
             case Calculation(sign, left, right):
                 (one, wrong), (other, also) = unit(left), unit(right)
                 if sign in "+-" and one and other and one != other:
@@ -46,8 +38,8 @@ def unlike_units(case: Case) -> Iterator[Fault]:
                 return "", ""
 
     causes: dict[tuple[str, str], dict[str, str]] = defaultdict(dict)  # by mismatch: the behaviours and their units
-    totals = {name: one.behavior for name, one in reading.problem.domain.aggregates.items()}
-    for name, behavior in (*totals.items(), *reading.problem.domain.behaviors.items()):
+    totals = {name: one.behavior for name, one in domain.aggregates.items()}
+    for name, behavior in (*totals.items(), *domain.behaviors.items()):
         for left, right, _ in _together(behavior):
             (one, wrong), (other, also) = unit(left), unit(right)
             if both := wrong or also or (f"{one} and {other}" if one and other and one != other else ""):
@@ -60,7 +52,7 @@ def unlike_units(case: Case) -> Iterator[Fault]:
         first, *others = done
         more = f"; {some(others)} {'have' if len(others) > 1 else 'has'} the same fault" if others else ""
         yield (
-            reading.names.iri(first),
+            case.names.iri(first),
             f"{first} combines numbers in {done[first]} ({named}){more}",
             "numbers of different units can't be combined",
             "use amounts of one unit, correct a c:unit, or multiply by a factor that converts one unit to the other",
@@ -79,17 +71,14 @@ def _together(behavior: Behavior) -> Iterator[tuple[Expression, Expression, str]
         yield Amount(effect.situation, effect.arguments), by, f"{effect.operation}s"
 
 
-def multiplied_amounts(case: Case) -> Iterator[Fault]:
+def multiplied_amounts(case: ReadCase) -> Iterator[Fault]:
     """Find products and quotients of changing amounts.
 
     The search for plans of a whole level doesn't support products and quotients of changing amounts.
     """
-    if case.reading is None:
-        return
-    domain, names = case.reading.problem.domain, case.reading.names
+    domain, names = case.problem.domain, case.names
     changed = {effect.situation for behavior in domain.behaviors.values() for effect in behavior.amounts}
-    rules = [(name, rule.behavior) for name, its in domain.rules.items() for rule in its]
-    for name, behavior in (*domain.behaviors.items(), *rules):
+    for name, behavior in case.behaviors_and_rules:
         found = dict[tuple[str, str, str], None]()
         for left, right, does in _together(behavior):
             for part in (*inside(left), *(() if does == "scales" else inside(right))):
@@ -107,14 +96,12 @@ def multiplied_amounts(case: Case) -> Iterator[Fault]:
             )
 
 
-def numbers_missing(case: Case) -> Iterator[Fault]:
+def numbers_missing(case: ReadCase) -> Iterator[Fault]:
     """Find individuals for which the ontology lacks a number that a behaviour reads.
 
     A behaviour isn't applicable to an individual without a number that the behaviour reads.
     """
-    if case.reading is None:
-        return
-    problem, names = case.reading.problem, case.reading.names
+    problem, names = case.problem, case.names
     lacking: dict[tuple[str, str], dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
     for behavior in problem.domain.behaviors.values():
         among = {term: (kind, frozenset(problem.classes.get(kind, ()))) for term, kind in behavior.kinds.items()}
@@ -128,7 +115,7 @@ def numbers_missing(case: Case) -> Iterator[Fault]:
                 lacking[relation, kind][one].add(behavior.name)
     for (relation, kind), found in sorted(lacking.items()):
         who = sorted(found)
-        some = ", ".join(who[:5]) + (", …" if len(who) > 5 else "")
+        some = some_of(who, 5)
         readers = " and ".join(sorted(set().union(*found.values())))
         has = "have" if len(who) > 1 else "has"
         yield (
@@ -172,11 +159,11 @@ ROUNDS = 4
 """Number of rounds after which a range that is still growing is treated as unbounded."""
 
 
-def amounts_out_of_reach(case: Case) -> Iterator[Fault]:
+def amounts_out_of_reach(case: ReadCase) -> Iterator[Fault]:
     """Find behaviours that are never applicable because their conditions or effects require unreachable amounts."""
-    if case.reading is None or not case.reading.problem.initial:
+    if not case.problem.initial:
         return
-    problem, names = case.reading.problem, case.reading.names
+    problem, names = case.problem, case.names
     ranges = _Ranges(problem)
     waiting = {
         name: one
@@ -258,7 +245,7 @@ class _Ranges:
             if left is None or right is None:
                 continue  # missing numbers are reported by another rule
             if not _possible(condition.operator, left, right):
-                return f"it requires that {_plain(condition)}", self.about(condition)
+                return f"it requires that {plain(condition)}", self.about(condition)
             if isinstance(condition.left, Amount):
                 narrowed[condition.left] = _narrowed(condition.operator, left, right)
             if isinstance(condition.right, Amount):
@@ -352,10 +339,6 @@ def _calculated(sign: str, one: Range, other: Range) -> Range:
 
 def _written(amount: Fraction | float) -> str:
     return written(amount) if isinstance(amount, Fraction) else str(amount)
-
-
-def _plain(condition: Condition) -> str:
-    return said(condition).replace("?", "")
 
 
 def some(names: Sequence[str], most: int = 5) -> str:

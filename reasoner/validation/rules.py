@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from confab.reasoner.validation import behaviors, contradictions, definitions, quantities, terms, times
-from confab.reasoner.validation.case import Case, Fault
+from confab.reasoner.validation.case import Case, Fault, ReadCase
 from confab.reasoner.validation.exclusive import values_not_kept_exclusive
 
 RULES: dict[str, Callable[[Case], Iterator[Fault]]] = {
@@ -16,6 +16,9 @@ RULES: dict[str, Callable[[Case], Iterator[Fault]]] = {
     "relative-iri": terms.relative_iris,
     "missing-all-different": terms.individuals_not_different,
     "file-name-and-iri": terms.files_and_iris,
+}
+"""Rules that any graph is checked with."""
+RULES_ON_PROBLEMS: dict[str, Callable[[ReadCase], Iterator[Fault]]] = {
     "undetermined-variable": behaviors.undetermined_variables,
     "other-kind": behaviors.other_kinds_in_when,
     "every-member-required": behaviors.every_member_required,
@@ -37,6 +40,7 @@ RULES: dict[str, Callable[[Case], Iterator[Fault]]] = {
     "number-missing": quantities.numbers_missing,
     "defined": definitions.defined,
 }
+"""Rules that a graph is checked with if its planning problem can be read."""
 WARNINGS = frozenset(
     {
         "axiom-not-watched",

@@ -14,6 +14,7 @@ import pyoxigraph as ox
 from confab import ontology
 from confab.reasoner.graph.knowledge import SCENE, text
 from confab.reasoner.names import local_name, nearest
+from confab.reasoner.reading.goals import some_of
 from confab.reasoner.reading.swrl import SWRL
 from confab.reasoner.validation.case import Case, Fault
 from confab.reasoner.vocabulary import MEMORY, OWL, RDF, RDFS, XSD
@@ -127,7 +128,7 @@ def individuals_not_different(case: Case) -> Iterator[Fault]:
         ):
             continue
         missing = sorted(individuals - max(groups, key=lambda group: len(group & individuals), default=frozenset()))
-        names = ", ".join(local_name(iri) for iri in missing[:5]) + (", …" if len(missing) > 5 else "")
+        names = some_of([local_name(iri) for iri in missing], 5)
         yield (
             missing[0] if missing else min(individuals),
             f"no statement says that {names} and the other individuals of {local_name(kind)} are different",

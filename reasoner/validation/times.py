@@ -9,19 +9,18 @@ from fractions import Fraction
 
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure
 from confab.reasoner.symbols import Behavior, Problem, Timing
-from confab.reasoner.validation.case import Case, Fault
-from confab.reasoner.vocabulary import CORE
+from confab.reasoner.validation.case import Fault, ReadCase
 
 SECONDS = ("", "s", "sec", "second", "seconds")
 """Notations of the unit of a duration; durations may have no unit."""
 
 
-def windows_too_short(case: Case) -> Iterator[Fault]:
+def windows_too_short(case: ReadCase) -> Iterator[Fault]:
     """Find individuals whose time windows are all shorter than a behaviour in which the individual takes part."""
-    if case.reading is None or case.reading.problem.times is None:
+    if case.problem.times is None:
         return
-    problem, names = case.reading.problem, case.reading.names
-    for individual, windows in case.reading.problem.times.windows.items():
+    problem, names = case.problem, case.names
+    for individual, windows in case.problem.times.windows.items():
         closed = [high - low for low, high in windows if high is not None]
         if len(closed) < len(windows):
             continue
@@ -46,19 +45,14 @@ def _names(problem: Problem, behavior: Behavior, individual: str) -> bool:
     return individual in actors or any(individual in problem.members(kind) for kind in kinds)
 
 
-def durations_in_other_units(case: Case) -> Iterator[Fault]:
+def durations_in_other_units(case: ReadCase) -> Iterator[Fault]:
     """Find calculated durations whose unit isn't the second."""
-    if case.reading is None:
-        return
-    reading = case.reading
-    units = {name: s.quantity.unit for name, s in reading.problem.domain.situations.items() if s.quantity}
-    units |= {reading.names.short(iri): node.get(CORE + "unit", [""])[0] for iri, node in reading.schema.nodes.items()}
-    for name, behavior in reading.problem.domain.behaviors.items():
+    for name, behavior in case.problem.domain.behaviors.items():
         duration = (behavior.timing or Timing()).duration
-        unit = None if duration is None else unit_of(duration, units)
+        unit = None if duration is None else unit_of(duration, case.units)
         if unit is not None and unit not in SECONDS:
             yield (
-                reading.names.iri(name),
+                case.names.iri(name),
                 f"the duration of {name} is calculated in {unit}",
                 "durations are read as seconds",
                 f"multiply by a factor that converts {unit} to seconds, or correct a c:unit",

@@ -5,7 +5,7 @@ checked property    location of the checks
 ==================  ========================================================================
 form                SHACL shapes, `ontology/shapes/*.ttl`
 violations          SPARQL queries that must have no rows, `ontology/checks/*.rq`
-rules in Python     `confab.reasoner.validation.rules.RULES`
+rules in Python     `confab.reasoner.validation.rules`
 measures of bodies  `confab.reasoner.embodiment.measures.RULES`, if the scene has a robot
 joints, features    `confab.reasoner.embodiment.joint_checks.RULES`, if the scene has a robot
 skills in phases    `confab.reasoner.embodiment.skill_checks.RULES`, if the scene has a robot
@@ -37,12 +37,12 @@ from confab.reasoner.graph.knowledge import BASE, GRAPHS, KnowledgeError, Knowle
 from confab.reasoner.memory.experience_file import parse
 from confab.reasoner.memory.links_file import memory_lines
 from confab.reasoner.names import local_name
-from confab.reasoner.reading.problem import Reading, read
+from confab.reasoner.reading.problem import read
 from confab.reasoner.updates.compiling import UpdateFault
-from confab.reasoner.validation.case import Case
+from confab.reasoner.validation.case import Case, ReadCase
 from confab.reasoner.validation.contradictions import impossible_situations
 from confab.reasoner.validation.findings import ERROR, REMARK, WARNING, Finding, Places, fill, unique
-from confab.reasoner.validation.rules import REMARKS, RULES, WARNINGS
+from confab.reasoner.validation.rules import REMARKS, RULES, RULES_ON_PROBLEMS, WARNINGS
 from confab.reasoner.validation.terms import misread
 from confab.reasoner.vocabulary import CORE, EMBODIMENT, PREFIXES, RDF, SHACL
 
@@ -128,10 +128,9 @@ def quick_errors(graph: KnowledgeGraph) -> list[Finding]:
         return []
     places = Places(graph)
     found = [finding for finding in _violations(graph, places) if finding.serious]
-    reading, problem = _read(graph)
+    case, problem = _read(graph)
     if problem and not found:
         found.append(_unreadable(graph, places, problem))
-    case = Case(graph, reading)
     sure = [*_sure(found, case)]
     return unique(finding for finding in (*sure, *_by_rules(case, places, sure)) if finding.serious)
 
@@ -144,11 +143,13 @@ def _sure(found: Sequence[Finding], case: Case) -> Iterator[Finding]:
 
 def _by_rules(case: Case, places: Places, found: Sequence[Finding]) -> Iterator[Finding]:
     """Yield the findings of the rules in Python, except those that may be consequences of faulty initial facts."""
-    wrong_facts = any(finding.rule in WRONG_FACTS for finding in found)
-    for rule, faults in RULES.items():
-        if rule in FROM_FACTS and (wrong_facts or next(impossible_situations(case), None) is not None):
-            continue
-        for node, what, why, remedy in faults(case):
+    rules = [(rule, faults(case)) for rule, faults in RULES.items()]
+    if isinstance(case, ReadCase):
+        wrong_facts = any(finding.rule in WRONG_FACTS for finding in found) or any(impossible_situations(case))
+        skipped = FROM_FACTS if wrong_facts else set()
+        rules += [(rule, faults(case)) for rule, faults in RULES_ON_PROBLEMS.items() if rule not in skipped]
+    for rule, faults in rules:
+        for node, what, why, remedy in faults:
             severity = WARNING if rule in WARNINGS else REMARK if rule in REMARKS else ERROR
             yield places.finding(rule, node, what, why, remedy, severity)
 
@@ -178,8 +179,7 @@ def _validate_one(file: str | Path, deep: bool, done: Callable[[str], object]) -
     done(f"checking the shapes of {path.name}")
     found += _ill_formed(graph, places)
     done(f"reading {path.name} as the planner does")
-    reading, problem = _read(graph)
-    case = Case(graph, reading)
+    case, problem = _read(graph)
     unread = _extending(graph, {fault.place.behavior for fault in faults})
     if faults:
         found = [f for f in found if f.node not in unread and f.rule not in NEEDS_ALL_BEHAVIORS]
@@ -193,7 +193,7 @@ def _validate_one(file: str | Path, deep: bool, done: Callable[[str], object]) -
     if problem and not any(finding.serious for finding in found):
         yield _unreadable(graph, places, problem)
     if not any(finding.serious for finding in found):
-        yield from _measured(graph, places, reading)
+        yield from _measured(case, places)
     yield from _by_rules(case, places, found)
     if deep:
         done(f"asking HermiT about {path.name}")
@@ -205,7 +205,7 @@ def _validate_one(file: str | Path, deep: bool, done: Callable[[str], object]) -
 
 def _in_memory(path: Path, graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
     """Yield the findings in a memory file: undeclared terms, wrong forms, and parts that planning can't read."""
-    case = Case(graph, None)
+    case = Case(graph)
     found = [places.finding("undeclared-term", *fault) for fault in RULES["undeclared-term"](case)]
     found += _sure([*_violations(graph, places), *_ill_formed(graph, places)], case)
     yield from found
@@ -234,30 +234,31 @@ def _merged(graph: KnowledgeGraph, places: Places) -> Iterator[Finding]:
         yield places.finding("merged-individuals", graph.scene, str(error), why, "drop one of the facts")
 
 
-def _measured(graph: KnowledgeGraph, places: Places, reading: Reading | None) -> Iterator[Finding]:
+def _measured(case: Case, places: Places) -> Iterator[Finding]:
     """Yield the findings on robots and bodies if the scene has a robot."""
-    if reading is None or not graph.select(ROBOTS):
+    if not isinstance(case, ReadCase) or not case.graph.select(ROBOTS):
         return
     try:
-        embodiment = read_embodiment(graph.store, reading.names.short, graph.folders)
+        embodiment = read_embodiment(case.graph.store, case.names.short, case.graph.folders)
     except EmbodimentError as error:
         why = "physics reads the file in the same way"
-        yield places.finding("unreadable-body", error.node or graph.scene, str(error), why, "see the message")
+        yield places.finding("unreadable-body", error.node or case.graph.scene, str(error), why, "see the message")
         return
     flaws = {rule: faults(embodiment) for rule, faults in MEASURES.items()}
-    flaws |= {rule: faults(embodiment, reading.problem.initial) for rule, faults in solid_checks.FIRST_RULES.items()}
+    flaws |= {rule: faults(embodiment, case.problem.initial) for rule, faults in solid_checks.FIRST_RULES.items()}
     for rule, found in flaws.items():
         for name, what, why, remedy in found:
-            yield places.finding(rule, name if "://" in name else reading.names.iri(name), what, why, remedy)
+            yield places.finding(rule, name if "://" in name else case.names.iri(name), what, why, remedy)
 
 
-def _read(graph: KnowledgeGraph) -> tuple[Reading | None, KnowledgeError | None]:
+def _read(graph: KnowledgeGraph) -> tuple[Case, KnowledgeError | None]:
+    """Return the case of a graph; if its planning problem can't be read, return the error, too."""
     try:
-        return read(graph), None
+        return ReadCase(graph, read(graph)), None
     except KnowledgeError as error:
-        return None, error
+        return Case(graph), error
     except (KeyError, ValueError) as error:
-        return None, KnowledgeError(f"{type(error).__name__}: {error}")
+        return Case(graph), KnowledgeError(f"{type(error).__name__}: {error}")
 
 
 def _unreadable(graph: KnowledgeGraph, places: Places, problem: KnowledgeError) -> Finding:

@@ -8,7 +8,7 @@ from confab.reasoner.graph.knowledge import KnowledgeGraph, load
 from confab.reasoner.names import local_name
 from confab.reasoner.reading.problem import read
 from confab.reasoner.symbols import Symbol
-from confab.reasoner.validation.case import Case
+from confab.reasoner.validation.case import ReadCase
 from confab.reasoner.validation.exclusive import values_not_kept_exclusive
 
 PREFIXES = (
@@ -19,7 +19,7 @@ PREFIXES = (
 
 def found(graph: KnowledgeGraph) -> list[tuple[str, str]]:
     infer(graph)
-    return [(local_name(node), what) for node, what, *_ in values_not_kept_exclusive(Case(graph, read(graph)))]
+    return [(local_name(node), what) for node, what, *_ in values_not_kept_exclusive(ReadCase(graph, read(graph)))]
 
 
 def changed(deleted: str, inserted: str = "") -> KnowledgeGraph:

@@ -13,7 +13,7 @@ from confab import ontology
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.validation.findings import listing
 from confab.reasoner.validation.hermit import NoJavaError
-from confab.reasoner.validation.rules import REMARKS, RULES, WARNINGS
+from confab.reasoner.validation.rules import REMARKS, RULES, RULES_ON_PROBLEMS, WARNINGS
 from confab.reasoner.validation.validate import checks, quick_errors, validate
 from tests.ontology.faults import BEGIN, DOCUMENT, FAULTS, WITH_BODIES, Fault, found, seed, skeleton
 
@@ -65,7 +65,7 @@ def test_an_inserted_fault_is_detected(fault: Fault, tmp_path: Path) -> None:
         assert Path(finding.file).parent in (tmp_path, ontology.ROOT)
 
 
-@pytest.mark.parametrize("rule", sorted(RULES.keys() - WARNINGS - REMARKS))
+@pytest.mark.parametrize("rule", sorted((RULES.keys() | RULES_ON_PROBLEMS.keys()) - WARNINGS - REMARKS))
 def test_the_quick_check_before_planning_finds_each_error_of_the_rules(rule: str, tmp_path: Path) -> None:
     file = seed(next(fault for fault in FAULTS if fault.rule == rule), tmp_path)
     errors = [error.rule for error in quick_errors(confab.load(file).knowledge)]
@@ -133,7 +133,7 @@ def test_a_situation_type_that_is_declared_for_a_lower_level_gets_no_remark(tmp_
 
 def test_every_rule_of_validation_has_an_inserted_fault() -> None:
     shapes = {line.split('sh:name "')[1].split('"')[0] for line in _lines("shapes/*.ttl") if 'sh:name "' in line}
-    rules = {check.rule for check in checks()} | set(RULES) | shapes
+    rules = {check.rule for check in checks()} | {*RULES, *RULES_ON_PROBLEMS} | shapes
     assert rules - {fault.rule for fault in FAULTS} == set()
 
 
