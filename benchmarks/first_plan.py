@@ -8,7 +8,6 @@ The steps are the clone, the installation from the package index, and `make demo
 from __future__ import annotations
 
 import os
-import resource
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -16,21 +15,21 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
 
+from benchmarks._processes import seconds_of_children
+
 ROOT = Path(__file__).resolve().parents[1]
 
 
 def timed(command: Sequence[str], folder: Path) -> tuple[float, float, str]:
     """Run a command; return its duration in seconds, its CPU seconds and its output."""
     environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "VIRTUAL_ENV", "MAKEFLAGS")}
-    begin, before = perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
+    begin, before = perf_counter(), seconds_of_children()
     done = subprocess.run(
         command, cwd=folder, env={**environment, "PIP_NO_CACHE_DIR": "1"}, capture_output=True, text=True, check=False
     )
     if done.returncode:
         sys.exit(f"{' '.join(command)}: {done.stderr[-500:]}")
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return perf_counter() - begin, cpu, done.stdout
+    return perf_counter() - begin, seconds_of_children() - before, done.stdout
 
 
 def main() -> None:

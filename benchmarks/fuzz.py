@@ -29,10 +29,10 @@ import sys
 import tempfile
 import time
 import traceback
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import redirect_stderr, redirect_stdout, suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
@@ -41,6 +41,7 @@ from typing import TYPE_CHECKING, Any
 import pyoxigraph as ox
 
 from benchmarks import broken_inputs, broken_worlds
+from benchmarks._processes import fork
 from benchmarks.broken_inputs import DOMAINS, HERE, TARGETS, Arguments
 from benchmarks.broken_worlds import WORLDS
 from confab.reasoner.graph.knowledge import KnowledgeError
@@ -93,12 +94,7 @@ def run_batch(door: str, seeds: Sequence[int], given: Path, keep: bool = False) 
     left = list(seeds)
     while left:
         reading, writing = os.pipe()
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # Python warns about forks with threads
-            child = os.fork()
-        if child == 0:
-            os.close(reading)
-            _answer_all(door, left, given, writing, keep)
+        child = fork(partial(_answer_all, door, left, given, reading, writing, keep))
         os.close(writing)
         with os.fdopen(reading, encoding="utf-8") as lines:
             for line in lines:
@@ -116,22 +112,18 @@ def run_batch(door: str, seeds: Sequence[int], given: Path, keep: bool = False) 
             yield Failure(door, left.pop(0), ended)
 
 
-def _answer_all(door: str, seeds: Sequence[int], given: Path, writing: int, keep: bool) -> None:
-    """Run cases in the child process, write a line for each case, and exit."""
-    code = 1
-    try:
-        for sign in TIME_IS_OVER:
-            signal.signal(sign, signal.SIG_DFL)
-        resource.setrlimit(resource.RLIMIT_AS, (MEGABYTES << 20, MEGABYTES << 20))
-        gc.set_threshold(50_000, 20, 20)
-        results = _recorded()
-        with os.fdopen(writing, "w", encoding="utf-8") as lines:
-            for seed in seeds:
-                what = _answer(door, seed, given, results, keep)
-                print(json.dumps(what), file=lines, flush=True)
-        code = 0
-    finally:
-        os._exit(code)
+def _answer_all(door: str, seeds: Sequence[int], given: Path, reading: int, writing: int, keep: bool) -> None:
+    """Run cases in the child process, and write a line for each case."""
+    os.close(reading)
+    for sign in TIME_IS_OVER:
+        signal.signal(sign, signal.SIG_DFL)
+    resource.setrlimit(resource.RLIMIT_AS, (MEGABYTES << 20, MEGABYTES << 20))
+    gc.set_threshold(50_000, 20, 20)
+    results = _recorded()
+    with os.fdopen(writing, "w", encoding="utf-8") as lines:
+        for seed in seeds:
+            what = _answer(door, seed, given, results, keep)
+            print(json.dumps(what), file=lines, flush=True)
 
 
 def _recorded() -> list[Result]:

@@ -17,7 +17,6 @@ import signal
 import sys
 import tempfile
 import time
-import warnings
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr, redirect_stdout, suppress
 from functools import partial
@@ -27,6 +26,7 @@ from typing import NamedTuple
 
 import pyoxigraph as ox
 
+from benchmarks._processes import fork
 from confab import load as confab_scene
 from confab.cli import main as confab
 from confab.memory import Memory
@@ -61,24 +61,21 @@ def killed(
 ) -> Ended:
     """Run a function in a separate process; send a signal to the process after a CPU time, or at one of its calls."""
     made = mmap.mmap(-1, 8)  # shared with the child
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # Python warns about forks with threads
-        child = os.fork()
-    if child == 0:
-        code = 1
+
+    def run() -> int:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         try:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
             with Path(os.devnull).open("w") as nowhere, redirect_stdout(nowhere), redirect_stderr(nowhere):
                 if call != math.inf or after == math.inf:
                     sys.setprofile(_counting(made, call, sign))
                 write()
-            code = 0
         except SystemExit as end:
-            code = int(end.code or 0)
+            return int(end.code or 0)
         except KeyboardInterrupt:
-            code = INTERRUPTED
-        finally:
-            os._exit(code)
+            return INTERRUPTED
+        return 0
+
+    child = fork(run)
     while (ended := os.wait4(child, os.WNOHANG))[0] == 0:
         if spent(child) >= after:
             os.kill(child, sign)
@@ -137,7 +134,7 @@ def crowd(kills: int, seed: int = 0) -> tuple[int, int]:
         _, seconds, _ = killed(lambda: learn(file, -1), after=1e9)
         acknowledged = Memory.load(file).experience.episodes["me"]
         for number in range(kills):
-            children = [forked(partial(learn, path, number), folder) for path in paths]
+            children = [fork(partial(learn_in, folder, path, number)) for path in paths]
             time.sleep(draw.uniform(0.0, len(paths) * seconds))
             os.kill(draw.choice(children), signal.SIGKILL)
             ended = [os.waitpid(child, 0)[1] for child in children]
@@ -149,21 +146,11 @@ def crowd(kills: int, seed: int = 0) -> tuple[int, int]:
     return done, lost
 
 
-def forked(write: Callable[[], object], folder: Path) -> int:
-    """Run a function in a folder in a separate process; return the number of the process."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # Python warns about forks with threads
-        child = os.fork()
-    if child == 0:
-        code = 1
-        try:
-            os.chdir(folder)
-            logging.disable()  # each process would log that it waits
-            write()
-            code = 0
-        finally:
-            os._exit(code)
-    return child
+def learn_in(folder: Path, path: Path, number: int) -> None:
+    """Learn one more episode in a process of its own, with a folder as its current folder."""
+    os.chdir(folder)
+    logging.disable()  # each process would log that it waits
+    learn(path, number)
 
 
 def torn(folder: Path) -> list[str]:

@@ -16,7 +16,6 @@ import json
 import os
 import resource
 import sys
-import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -32,6 +31,7 @@ from time import process_time
 from types import CodeType, FunctionType
 from typing import Any, TypedDict
 
+from benchmarks._processes import fork, silence
 from benchmarks.mixed import SHARES
 from benchmarks.mutants import LIBRARIES, ROOT, Instead, faults, meaning
 from confab.planner.certificates import Certificate
@@ -268,23 +268,16 @@ def _differing(old: CodeType, new: CodeType) -> Iterator[tuple[CodeType, CodeTyp
 def forked(run: Callable[[Callable[[object], None]], None], seconds: int | None) -> tuple[list[Any], bool]:
     """Call a function in a separate process; return what it tells, and whether it returns within its CPU seconds."""
     reading, writing = os.pipe()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # Python warns about forks with threads
-        child = os.fork()
-    if child == 0:
-        code = 1
-        try:
-            if seconds is not None:
-                resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
-            os.close(reading)
-            with open(os.devnull, "w") as nowhere:  # noqa: PTH123
-                os.dup2(nowhere.fileno(), 1)
-                os.dup2(nowhere.fileno(), 2)
-            with os.fdopen(writing, "w") as answers:
-                run(lambda said: print(json.dumps(said), file=answers, flush=True))
-            code = 0
-        finally:
-            os._exit(code)
+
+    def tell() -> None:
+        if seconds is not None:
+            resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
+        os.close(reading)
+        silence()
+        with os.fdopen(writing, "w") as answers:
+            run(lambda said: print(json.dumps(said), file=answers, flush=True))
+
+    child = fork(tell)
     os.close(writing)
     with os.fdopen(reading) as given:
         said = [json.loads(line) for line in given]

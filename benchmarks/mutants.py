@@ -21,7 +21,6 @@ import os
 import random
 import signal
 import sys
-import warnings
 from collections.abc import Iterator, Sequence
 from importlib import import_module
 from importlib.abc import Loader
@@ -31,6 +30,8 @@ from itertools import islice
 from pathlib import Path
 from types import ModuleType
 from typing import TypedDict
+
+from benchmarks._processes import fork, silence
 
 ROOT = Path(__file__).resolve().parents[1]
 RECORD = Path(__file__).with_name("mutants.json")
@@ -109,26 +110,19 @@ class Record(TypedDict):
 
 def noticed(file: str, text: str, seconds: float = 600.0) -> bool:
     """Return whether a module's tests fail, or don't end in time, with a changed text of the module."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # Python warns about forks with threads
-        child = os.fork()
-    if child == 0:
-        code = 1
-        try:
-            signal.setitimer(signal.ITIMER_PROF, seconds)
-            signal.alarm(int(WAITING * seconds))  # some faults let a test wait for ever
-            with open(os.devnull, "w") as nowhere:  # noqa: PTH123
-                os.dup2(nowhere.fileno(), 1)
-                os.dup2(nowhere.fileno(), 2)
-            sys.meta_path.insert(0, Instead(file, text))
-            import pytest
 
-            code = int(
-                pytest.main(["-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist", "--assert=plain", *TESTS[file]])
-            )
-        finally:
-            os._exit(code)
-    _, state = os.waitpid(child, 0)
+    def run() -> int:
+        signal.setitimer(signal.ITIMER_PROF, seconds)
+        signal.alarm(int(WAITING * seconds))  # some faults let a test wait for ever
+        silence()
+        sys.meta_path.insert(0, Instead(file, text))
+        import pytest
+
+        return int(
+            pytest.main(["-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist", "--assert=plain", *TESTS[file]])
+        )
+
+    _, state = os.waitpid(fork(run), 0)
     return not (os.WIFEXITED(state) and os.WEXITSTATUS(state) == 0)
 
 

@@ -14,7 +14,6 @@ import signal
 import sys
 import tempfile
 import time
-import warnings
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from importlib import import_module
@@ -22,6 +21,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from uuid import uuid4
 
+from benchmarks._processes import fork, silence
 from benchmarks.outputs import SCENE, prepare
 from confab.cli import main as confab
 from confab.scene import load
@@ -137,22 +137,16 @@ def served(scene: Path) -> None:
 
 def begun(run: Callable[[], object]) -> int:
     """Run a function in a separate process and process group; return the process number."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # Python warns about forks with threads
-        child = os.fork()
-    if child == 0:
-        code = 1
-        try:
-            os.setpgid(0, 0)
-            faulthandler.disable()
-            signal.signal(signal.SIGINT, signal.default_int_handler)
-            nowhere = os.open(os.devnull, os.O_RDWR)
-            for stream in (0, 1, 2):
-                os.dup2(nowhere, stream)
-            run()
-            code = 0
-        finally:
-            os._exit(code)
+
+    def alone() -> None:
+        os.setpgid(0, 0)
+        faulthandler.disable()
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+        silence()
+        run()
+
+    child = fork(alone)
     os.setpgid(child, child)  # the child also calls this; either call may be the first
     return child
 

@@ -21,8 +21,9 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
-from resource import RUSAGE_CHILDREN, getrusage
 from time import perf_counter
+
+from benchmarks._processes import seconds_of_children
 
 SCENES = {
     "1,000 objects": ("served", "--objects", "1000"),
@@ -222,11 +223,10 @@ def waiting(process: int) -> float:
 
 def confab(*arguments: str) -> float:
     """Run a command that must succeed; return its CPU seconds."""
-    before = getrusage(RUSAGE_CHILDREN)
+    before = seconds_of_children()
     command = [sys.executable, "-c", "from confab.start import main; main()", *arguments]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    after = getrusage(RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return seconds_of_children() - before
 
 
 def main(limits: Sequence[float], chosen: Collection[int], files: Sequence[str]) -> None:

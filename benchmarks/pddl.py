@@ -38,6 +38,8 @@ from math import exp, log
 from pathlib import Path
 from time import process_time
 
+from benchmarks._processes import seconds_of_children
+
 SECONDS, BYTES = 30, 4 * 2**30
 ROOT = Path(__file__).resolve().parents[1]
 PER_FOLDER = 4
@@ -179,7 +181,7 @@ def run(command: Sequence[str], domain: Path, problem: Path, cap: int = SECONDS)
         copy.write_text(problem.read_text())
         plan = Path(folder) / "plan"
         words = [w.format(domain=domain, problem=copy, plan=plan) for w in command]
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        before = seconds_of_children()
         try:
             done = subprocess.run(
                 words,
@@ -193,8 +195,7 @@ def run(command: Sequence[str], domain: Path, problem: Path, cap: int = SECONDS)
             output = done.stdout + done.stderr
         except subprocess.TimeoutExpired:
             output = "timeout"
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        seconds = seconds_of_children() - before
         beside = Path(f"{copy}.soln")
         text = next((p.read_text() for p in (plan, beside) if p.exists()), None)
         lines = None if text is None else tuple(re.findall(r"^\((.*)\)", text, re.MULTILINE))

@@ -26,6 +26,8 @@ from pathlib import Path
 from time import perf_counter, process_time
 from typing import Any
 
+from benchmarks._processes import seconds_of_children
+
 CALLS = (4, 50, 200, 1_000, 10_000)
 OBJECTS = (24, 70, 224)  # with twice as many places, this is a thousand to a hundred thousand moves
 RDFLIB_OBJECTS = (4, 12, 24, 70)
@@ -133,10 +135,9 @@ def cold(script: str) -> float:
     compiled = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     best = float("inf")
     for _ in range(REPEATS):
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        before = seconds_of_children()
         subprocess.run([sys.executable, "-c", script], stdout=subprocess.DEVNULL, cwd=ROOT, env=compiled, check=True)
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        best = min(best, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+        best = min(best, seconds_of_children() - before)
     return best
 
 

@@ -27,6 +27,8 @@ from fractions import Fraction
 from pathlib import Path
 from time import process_time
 
+from benchmarks._processes import seconds_of_children
+
 SECONDS, VALIDATING = 30, 5
 ROOT = Path(__file__).resolve().parents[1]
 PROBLEMS = Path(os.environ.get("CONFAB_TEMPORAL", ROOT.parent / "shared" / "temporal"))
@@ -181,8 +183,7 @@ def one(domain: Path, problem: Path) -> None:
     from confab.reasoner.timing import only_during
 
     def used() -> float:
-        children = resource.getrusage(resource.RUSAGE_CHILDREN)
-        return process_time() + children.ru_utime + children.ru_stime
+        return process_time() + seconds_of_children()
 
     found = imported(parse_files(domain, problem))
     if only_during(found.problem):
