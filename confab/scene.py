@@ -354,7 +354,11 @@ def read(
             return read(Path(name))
         content = source.read()
         return load_text(content.encode() if isinstance(content, str) else content)
-    graph = _read(source)
+    return _inferred(_read(source), begin)
+
+
+def _inferred(graph: KnowledgeGraph, begin: float) -> Scene:
+    """Return the scene of a graph that is loaded since the time `begin`, with the inferences; a failure is a fault of the graph."""
     try:
         infer(graph)
     except KnowledgeError as error:
@@ -407,11 +411,7 @@ def load_text(content: bytes) -> Scene:
             raise KnowledgeError(said(error)) from error
         graph.faults[:] = map(said, graph.faults)
     graph.files.pop(graph.scene, None)
-    try:
-        infer(graph)
-    except KnowledgeError as error:
-        graph.faults.append(str(error))
-    return Scene(graph, {"load": perf_counter() - begin})
+    return _inferred(graph, begin)
 
 
 def _local(address: str | PathLike[str]) -> str | Path:

@@ -11,6 +11,7 @@ from confab.reasoner.aggregates.dependencies import in_order, read_by, unfolded
 from confab.reasoner.aggregates.extrema import extrema_replaced
 from confab.reasoner.aggregates.remembering import NONE_ALLOWED, solutions_of
 from confab.reasoner.amounts import Amount, Quantity, inside, written
+from confab.reasoner.closure import closure
 from confab.reasoner.derivation import TASK, circles, needed
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.language import DomainError, walk
@@ -319,16 +320,12 @@ def _on_their_levels(
 ) -> Iterator[SituationType]:
     """Yield the situation types with their levels; a derived type has the first level with all types on which it depends."""
     known = {s.name: s for s in situations}
-    earlier = None
     reads = {name: {s for rule in its for s, _ in needed(rule.conditions)} for name, its in rules.items()}
     reads |= {name: {*read_by(one)} for name, one in aggregates.items()}
     reads |= {name: {source} for name, source in before.remembers.items()}
-    while earlier != known:
-        earlier = dict(known)
-        for name, its in reads.items():
-            read = its | {name}
-            known[name] = replace(known[name], level=max(known[s].level for s in read if s in known))
-    yield from known.values()
+    for name, situation in known.items():
+        read = closure([name], lambda each: reads.get(each, ()))
+        yield replace(situation, level=max(known[each].level for each in read if each in known))
 
 
 def _definitions(schema: OntologySchema, names: Names) -> Definitions:

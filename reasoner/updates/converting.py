@@ -330,12 +330,12 @@ def compiled_again(graph: KnowledgeGraph, iri: str, written: str, prefixes: Mapp
         nodes.setdefault(text(triple.subject), {}).setdefault(triple.predicate.value, []).append(text(triple.object))  # type: ignore[arg-type]
     schema = read_schema(graph)
     nodes[iri] = {**{k: list(v) for k, v in schema.nodes[iri].items() if k not in LINKS}, **nodes[iri]}
-    priced = {*schema.nodes[iri].get(CORE + "price", ())}  # updates can't express prices, so the calculation is kept
-    while (
-        more := {v for node in priced for values in schema.nodes[node].values() for v in values}
-        & schema.nodes.keys() - priced
-    ):
-        priced |= more
+
+    def mentioned(node: str) -> list[str]:
+        return [v for values in schema.nodes[node].values() for v in values if v in schema.nodes]
+
+    # updates can't express prices, so the calculation is kept
+    priced = closure(schema.nodes[iri].get(CORE + "price", ()), mentioned)
     others = {
         node: said
         for node, said in schema.nodes.items()
