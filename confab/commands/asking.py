@@ -23,6 +23,7 @@ from confab.commands.options import (
     Output,
     Text,
     command,
+    output_option,
 )
 from confab.examples import examples
 from confab.progress import progress
@@ -102,14 +103,7 @@ FORMS = {
 )
 @click.option("--format", "form", help="Format: table, csv, json, tsv, sparql-json or sparql-xml.")
 @click.option("--iris", is_flag=True, help="Print full IRIs instead of short names.")
-@click.option(
-    "-o",
-    "--output",
-    "out",
-    type=Output(),
-    metavar="FILE",
-    help="File to write; FILE.ttl gets the triples of a CONSTRUCT query.",
-)
+@output_option(type=Output(), metavar="FILE", help="File to write; FILE.ttl gets the triples of a CONSTRUCT query.")
 @QUERY_SECONDS
 @QUERY_ROWS
 @click.option("--service", is_flag=True, help="Allow the query to use other endpoints (SERVICE).")

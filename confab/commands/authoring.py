@@ -24,7 +24,8 @@ from confab.commands.options import (
     Output,
     Text,
     command,
-    scene_names,
+    output_option,
+    scene_argument,
 )
 from confab.examples import examples
 from confab.progress import progress
@@ -79,9 +80,7 @@ def fetch(url: str, folder: Path) -> None:
 
 @command(epilog=examples("picture"))
 @SCENE
-@click.option(
-    "-o", "--output", "out", type=Output(PICTURE), required=True, metavar="FILE.png", help="File to draw into."
-)
+@output_option(type=Output(PICTURE), required=True, metavar="FILE.png", help="File to draw into.")
 @click.option("--behavior", metavar="BEHAVIOR", help="Draw the conditions and effects of this behaviour.")
 @click.option("--classes", is_flag=True, help="Draw the classes of objects.")
 def picture(scene: str, out: Path, behavior: str | None, classes: bool) -> None:
@@ -92,15 +91,7 @@ def picture(scene: str, out: Path, behavior: str | None, classes: bool) -> None:
 
 
 @command(epilog=examples("validate"))
-@click.argument(
-    "files",
-    type=Text(A_SCENE),
-    nargs=-1,
-    required=True,
-    metavar="FILE…",
-    shell_complete=scene_names,
-    help="Ontology files, or names of shipped scenes.",
-)
+@scene_argument("files", metavar="FILE…", help="Ontology files, or names of shipped scenes.", nargs=-1, required=True)
 @click.option("--deep", is_flag=True, help="Also find contradictions with HermiT; needs Java.")
 @click.option("--strict", is_flag=True, help="Count a warning as an error: exit 1.")
 @click.option("--watch", is_flag=True, help="Validate again after each change of a file, until Ctrl-C.")
@@ -143,9 +134,7 @@ def _validated(files: tuple[str, ...], deep: bool, strict: bool, time_limit: flo
 
 @command(epilog=examples("generate"))
 @click.argument("family", metavar="FAMILY", help="served, swap, rotate, full, handover, blocked, random or unsolvable.")
-@click.option(
-    "-o", "--output", "out", type=Output(GENERATED), required=True, metavar="SCENE.ttl", help="File to write."
-)
+@output_option(type=Output(GENERATED), required=True, metavar="SCENE.ttl", help="File to write.")
 @click.option("--objects", type=int, default=4, metavar="N", help="Objects, half of them cups.")
 @click.option("--hands", type=int, default=2, metavar="H", help="Hands.")
 @click.option("--clutter", type=int, default=0, metavar="K", help="Irrelevant objects in other rooms.")
@@ -167,14 +156,7 @@ def generate(family: str, out: Path, objects: int, hands: int, clutter: int, see
     default="sparql",
     help="Write each behaviour as one SPARQL update, or its conditions and effects as individuals.",
 )
-@click.option(
-    "-o",
-    "--output",
-    "out",
-    type=Output(CONVERTED),
-    metavar="FILE.ttl",
-    help="File to write; by default the result is printed.",
-)
+@output_option(type=Output(CONVERTED), metavar="FILE.ttl", help="File to write; by default the result is printed.")
 def convert(file: Path, form: str, out: Path | None) -> None:
     """Write the behaviours of a file in another form."""
     from confab.reasoner.updates.converting import convert as converted
@@ -201,7 +183,7 @@ def convert(file: Path, form: str, out: Path | None) -> None:
     metavar="[OTHER.pddl]",
     help="The problem for a PDDL domain, or the domain for a PDDL problem.",
 )
-@click.option("-o", "--output", "out", type=Output(IMPORTED), required=True, metavar="SCENE.ttl", help="File to write.")
+@output_option(type=Output(IMPORTED), required=True, metavar="SCENE.ttl", help="File to write.")
 @click.option(
     "--level",
     type=click.IntRange(min=1),
@@ -241,7 +223,7 @@ def import_(
 
 @command(epilog=examples("export"))
 @SCENE
-@click.option("-o", "--output", "out", type=PATH, required=True, metavar="OUT", help="Folder, or file, to write.")
+@output_option(type=PATH, required=True, metavar="OUT", help="Folder, or file, to write.")
 @click.option("--level", type=int, help="Level to export; by default the lowest.")
 @click.option(
     "--trajectory", is_flag=True, help="Export the joint trajectories of a verified plan into a .json or .yaml file."

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 import click
 from click.exceptions import Exit
 
-from confab.commands.given import SCENE as A_SCENE
 from confab.commands.given import load_scene
 from confab.commands.misplaced import kind_of_value, known_as
-from confab.commands.options import AS_JSON, QUIET, TIME_LIMIT, Command, Input, Output, Text, command, scene_names
+from confab.commands.options import AS_JSON, QUIET, TIME_LIMIT, Command, Input, Output, Text, command, scene_argument
 from confab.examples import examples
 from confab.progress import progress
 from confab.reasoner.kinds import EPISODE, MEMORY, PICTURE, PLAN
@@ -22,15 +21,7 @@ if TYPE_CHECKING:
 
 
 @command(epilog=examples("learn"))
-@click.argument(
-    "scenes",
-    type=Text(A_SCENE),
-    nargs=-1,
-    required=True,
-    metavar="SCENE…",
-    shell_complete=scene_names,
-    help="Scenes to plan in and learn from.",
-)
+@scene_argument("scenes", metavar="SCENE…", help="Scenes to plan in and learn from.", nargs=-1, required=True)
 @click.option(
     "--memory",
     "-o",

@@ -211,13 +211,9 @@ def QUIET(function: Any) -> Any:  # noqa: N802 - it is used like the constants t
     return _QUIET(_VERBOSE(function))
 
 
-_SCENE = click.argument(
-    "scene",
-    type=Text(A_SCENE),
-    metavar="SCENE",
-    shell_complete=scene_names,
-    help="Shipped name, file, URL of a SPARQL endpoint, or - for stdin.",
-)
+scene_argument = partial(click.argument, type=Text(A_SCENE), shell_complete=scene_names)
+output_option = partial(click.option, "-o", "--output", "out")
+_SCENE = scene_argument("scene", metavar="SCENE", help="Shipped name, file, URL of a SPARQL endpoint, or - for stdin.")
 
 
 def _stored(context: click.Context, option: click.Parameter, given: tuple[str, ...]) -> None:

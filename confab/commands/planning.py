@@ -19,7 +19,6 @@ from confab.commands.given import (
     plan_in,
     warn_of_errors,
 )
-from confab.commands.given import SCENE as A_SCENE
 from confab.commands.options import (
     AS_JSON,
     CHANGES,
@@ -40,7 +39,8 @@ from confab.commands.options import (
     Output,
     Text,
     command,
-    scene_names,
+    output_option,
+    scene_argument,
 )
 from confab.examples import examples
 from confab.planner.solve import DEFAULT_MODE, Mode
@@ -90,7 +90,7 @@ if TYPE_CHECKING:
 @click.option(
     "--report", type=Output(REPORT), metavar="FILE.html", help="Write the plan and its reasons as an HTML page."
 )
-@click.option("-o", "--output", "out", type=Output(PLAN), metavar="PLAN.json", help="Write the plan into this file.")
+@output_option(type=Output(PLAN), metavar="PLAN.json", help="Write the plan into this file.")
 @SCENE_IRI
 @AS_JSON
 @QUIET
@@ -149,14 +149,12 @@ def plan(
 
 
 @command(epilog=examples("run"))
-@click.argument(
+@scene_argument(
     "scene",
-    type=Text(A_SCENE),
+    metavar="[SCENE]",
+    help="Shipped name, file, or URL of a SPARQL endpoint.",
     required=False,
     default="beverage-serving",
-    metavar="[SCENE]",
-    shell_complete=scene_names,
-    help="Shipped name, file, or URL of a SPARQL endpoint.",
 )
 @CHANGES
 @GOALS
@@ -220,9 +218,7 @@ def run(
 @click.option(
     "--memory", type=Output(MEMORY), metavar="FILE", help="Write the measured durations into this memory file."
 )
-@click.option(
-    "-o", "--output", "out", type=Output(VERDICTS), metavar="VERDICTS.json", help="Write the verdicts into this file."
-)
+@output_option(type=Output(VERDICTS), metavar="VERDICTS.json", help="Write the verdicts into this file.")
 @TIME_LIMIT
 @AS_JSON
 @QUIET
