@@ -28,10 +28,6 @@ class Sayings:
     """Writer of sentences about learned experience.
 
     The sentences use labels if labels are available, and otherwise the ontology's names.
-
-    Parameters
-    ----------
-    labels : Labels, optional
     """
 
     def __init__(self, labels: Labels | None = None) -> None:

@@ -83,10 +83,6 @@ def check_world(
     stopped_within : float
         Time in seconds within which `execute` must return after `stop`.
 
-    Returns
-    -------
-    Conformance
-
     Examples
     --------
     >>> import confab

@@ -101,12 +101,6 @@ class AmountTable:
     """The amounts of a level during grounding.
 
     Each changing amount receives a position in the tuple, and each comparison receives a bit.
-
-    Parameters
-    ----------
-    problem : Problem
-    level : int
-    initial : State
     """
 
     def __init__(self, problem: Problem, level: int, initial: State) -> None:

@@ -16,12 +16,7 @@ from confab.reasoner.validation.hermit import world_of
 
 
 class Mirror:
-    """An owlready2 world of a knowledge graph's scene.
-
-    Attributes
-    ----------
-    world : owlready2.World
-    """
+    """An owlready2 world (`world`) of a knowledge graph's scene."""
 
     def __init__(self, graph: KnowledgeGraph) -> None:
         self.graph = graph

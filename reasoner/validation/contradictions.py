@@ -86,11 +86,7 @@ def _witnesses(condition: Condition) -> Iterator[Witness]:
 def clashing(conditions: Sequence[Condition], problem: Problem, kinds: Mapping[str, str]) -> Clash | None:
     """Return two conditions of a conjunction that no state satisfies together; return None if every pair is satisfiable.
 
-    Parameters
-    ----------
-    conditions : sequence of Condition
-    problem : Problem
-    kinds : mapping of term to class
+    `kinds` are the classes of the terms.
     """
     parts = [*_conjuncts(conditions, problem)]
     for place, one in enumerate(parts):
