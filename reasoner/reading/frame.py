@@ -330,7 +330,8 @@ def _on_their_levels(
 
 def _definitions(schema: OntologySchema, names: Names) -> Definitions:
     """Return the definitions of classes and situation types, with the domains and ranges of properties."""
-    properties, kinds = _value_properties(schema), dict[str, tuple[str, str]]()
+    properties = {prop: (iri, iri not in schema.pairs) for prop, iri in schema.value_properties.items()}
+    kinds: dict[str, tuple[str, str]] = {}
     owners: dict[str, list[str]] = defaultdict(list)
     for kind, situation in schema.owners:
         owners[situation].append(kind)
@@ -350,15 +351,6 @@ def _definitions(schema: OntologySchema, names: Names) -> Definitions:
             if kind in of_rules or iri in ruled:
                 concluded[kind] = iri, owners[iri][0] if len(owners[iri]) == 1 else ""
     return replace(found, concluded=concluded)
-
-
-def _value_properties(schema: OntologySchema) -> dict[str, tuple[str, bool]]:
-    """Return the situation type of each value property, and whether the property is functional."""
-    return {
-        prop: (iri, iri not in schema.pairs)
-        for iri in schema.of_kind("SituationType")
-        for prop in schema.nodes[iri].get(CORE + "valueProperty", ())
-    }
 
 
 def _check_rest_values(domain: Domain, names: Names) -> None:

@@ -95,6 +95,12 @@ class OntologySchema:
         return frozenset(amounts.union(self.by_kind.get(OWL + "DatatypeProperty", ())))
 
     @cached_property
+    def value_properties(self) -> Mapping[str, str]:
+        """The situation type of each value property."""
+        types = self.of_kind("SituationType")
+        return {prop: iri for iri in types for prop in self.nodes[iri].get(CORE + "valueProperty", ())}
+
+    @cached_property
     def individuals_of(self) -> frozenset[str]:
         """The classes of objects; in a condition or effect, such a class stands for all of its members."""
         known = {*self.supers, *chain.from_iterable(self.supers.values()), *(kind for kind, _ in self.owners)}

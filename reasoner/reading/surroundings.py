@@ -45,11 +45,7 @@ class Surroundings:
     def __init__(self, graph: KnowledgeGraph, slice_: Reading) -> None:
         self.graph, self.schema, self.names = graph, slice_.schema, slice_.names
         self.individuals = Individuals(graph, self.schema)
-        self.forward = {
-            p
-            for s in self.schema.of_kind("SituationType")
-            for p in self.schema.nodes[s].get(CORE + "valueProperty", ())
-        } - self.schema.numbers
+        self.forward = self.schema.value_properties.keys() - self.schema.numbers
         known = slice_.problem.individuals
         self._add({self.names.iri(name) for name in known} | constants_of(self.schema), self._classes_of_goals())
         self._known: Frame | None = None

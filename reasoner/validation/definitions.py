@@ -33,11 +33,7 @@ NOT_EVALUATED = {
 def definitions_without_effect(case: ReadCase) -> Iterator[Fault]:
     """Find axioms about situation types that planning ignores, and stated facts about derived situation types."""
     schema, names, rules = case.reading.schema, case.names, case.problem.domain.rules
-    of = {
-        prop: iri
-        for iri in schema.of_kind("SituationType")
-        for prop in schema.nodes[iri].get(CORE + "valueProperty", ())
-    }
+    of = schema.value_properties
     changed = {
         iri for effect in schema.of_kind("ValueEffect") for iri in schema.nodes[effect].get(CORE + "situationType", ())
     }
