@@ -41,7 +41,7 @@ OVERVIEW: Mapping[str, str] = {
     "schedule": "to read: makespan, slots, intervals, lanes(), serial, work, plan; about optimality: bound, bounds, least, "
     "scheduler; also: arcs",
     "labels": "to read: name(NAME), fact(FACT), step(STEP), behavior(BEHAVIOR, TERMS), sentence(TEXT), about(SYMBOL), words, "
-    "verbs; also: verb, condition, placed, domain",
+    "verbs; also: verb, condition, grounded, placed, domain",
     "explanation": "to read: what, step, number, id, path, gives, needs, reasons(), asked, answer, lacks, more, breaks, "
     "headline, steps, plan, proof; to save: json()",
     "execution": "to read: reached, plan, violations, soft_goals, episode.status, episode.reasons, episode.seconds; what "

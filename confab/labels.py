@@ -130,13 +130,16 @@ class Labels:
 
     def step(self, step: Step) -> str:
         """Return a step as a sentence, or the different sentences of steps that are refined together."""
-        return "; ".join(dict.fromkeys(map(self._of_step, step.together)))
+        return "; ".join(
+            dict.fromkeys(self.grounded(one.behavior, one.arguments, one.bindings) for one in step.together)
+        )
 
-    def _of_step(self, step: Step) -> str:
-        behavior = self.domain.behaviors[step.behavior]
-        terms = dict(zip((p.name for p in behavior.parameters), step.arguments, strict=True))
-        terms |= {f"?{name.lstrip('?')}": value for name, value in step.bindings.items()}
-        return self.behavior(behavior, terms)
+    def grounded(self, name: str, arguments: Sequence[str], bindings: Mapping[str, str] | None = None) -> str:
+        """Return a behaviour with its arguments as a sentence; arguments that are variables aren't mentioned."""
+        behavior = self.domain.behaviors[name]
+        terms = dict(zip((p.name for p in behavior.parameters), arguments, strict=True))
+        terms |= {f"?{name.lstrip('?')}": value for name, value in (bindings or {}).items()}
+        return self.behavior(behavior, {term: value for term, value in terms.items() if not value.startswith("?")})
 
     def behavior(self, behavior: Behavior, terms: Mapping[str, str]) -> str:
         """Return a behaviour as a sentence, in which `terms` (for example individuals) replace some of its roles."""

@@ -408,9 +408,7 @@ def _given(problem: Problem, behavior: Behavior, text: str) -> dict[str, str]:
 
 
 def _step_told(asked: str, problem: Problem, plan: Plan, labels: Labels, found: Contrast, chosen: str) -> WhyNot:
-    behavior = problem.domain.behaviors[found.behavior]
-    terms = dict(zip((p.name for p in behavior.parameters), found.arguments, strict=True))
-    what = labels.behavior(behavior, {t: v for t, v in terms.items() if not v.startswith("?")})
+    what = labels.grounded(found.behavior, found.arguments)
     assert found.instead is not None
     place = (
         f"“{labels.step(found.instead)}” ({numbers(plan)[found.instead.path]})"
@@ -511,10 +509,6 @@ def _breaks(problem: Problem, plan: Plan, other: Plan, labels: Labels) -> tuple[
         if one.behavior is None:
             found.append(f"{what}no behaviour of level {level} brings it about")
             continue
-        behavior = problem.domain.behaviors[one.behavior]
-        terms = dict(zip((p.name for p in behavior.parameters), one.arguments, strict=True))
-        doing = labels.behavior(behavior, {term: value for term, value in terms.items() if not value.startswith("?")})
-        found.append(
-            f"{what}“{doing}” of level {level} requires that {' and '.join(map(labels.condition, one.conditions))}"
-        )
+        doing, asks = labels.grounded(one.behavior, one.arguments), map(labels.condition, one.conditions)
+        found.append(f"{what}“{doing}” of level {level} requires that {' and '.join(asks)}")
     return tuple(dict.fromkeys(found))
