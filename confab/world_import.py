@@ -29,7 +29,7 @@ WORLD_FILES = {".yaml": "pyrobosim", ".yml": "pyrobosim"}
 """The name of the interface that reads a world file, indexed by the suffix of the file."""
 
 
-def scene_of_world(on: str, path: Path, seed: int = 0, title: str = "") -> int:
+def scene_of_world(on: str, path: Path) -> int:
     """Write the world model of a robot as a scene in Turtle, and return the number of the scene's individuals.
 
     Parameters
@@ -38,9 +38,6 @@ def scene_of_world(on: str, path: Path, seed: int = 0, title: str = "") -> int:
         ``INTERFACE:ADDRESS`` with a shipped interface, or a world file whose suffix determines the interface.
     path : Path
         File to write.
-    seed : int
-        Seed of a simulated robot.
-    title : str, optional
 
     Raises
     ------
@@ -56,12 +53,12 @@ def scene_of_world(on: str, path: Path, seed: int = 0, title: str = "") -> int:
         raise KnowledgeError(f"no interface '{name}'{nearest(name, known)} (interfaces: {', '.join(known)})")
     domain = load(str(known[name]))
     interface = read_interface(domain.knowledge.store, domain.names.short, name)
-    transport = reached(interface, where, seed)
+    transport = reached(interface, where, 0)
     try:
         model = getattr(transport, "scene_model", transport.model)()
     except RobotError as error:
         raise KnowledgeError(str(error)) from error
-    text, count = scene_text(interface, model, path.stem, title or f"World of {Path(where).name or where}")
+    text, count = scene_text(interface, model, path.stem, f"World of {Path(where).name or where}")
     write_whole(path, stamped(IMPORTED, [text]))
     return count
 

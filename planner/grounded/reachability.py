@@ -335,13 +335,10 @@ class Reached:
         """The evaluation of static conditions."""
         return Formulas(self)
 
-    def effect_rows(self, schema: Schema, effect: ValueEffect, rows: Ints, value: bool = True) -> Ints:
-        """Return the table row that an effect makes true, for each row of a schema.
-
-        Without `value`, the table rows contain only the arguments of the symbol.
-        """
+    def effect_rows(self, schema: Schema, effect: ValueEffect, rows: Ints) -> Ints:
+        """Return the table row that an effect makes true, for each row of a schema."""
         boolean = self.situations[effect.situation].boolean
-        terms = effect.arguments if boolean or not value else (*effect.arguments, effect.value)
+        terms = effect.arguments if boolean else (*effect.arguments, effect.value)
         place = {name: column for column, name in enumerate(schema.terms)}
         columns = [rows[:, place[t]] if t in place else np.full(len(rows), self.number[t]) for t in terms]
         return np.stack(columns, axis=1) if columns else np.zeros((len(rows), 0), np.int64)
