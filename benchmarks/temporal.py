@@ -119,7 +119,8 @@ def _problems() -> None:
                 row = table.setdefault(folder.name, {}).setdefault(planner, {})
                 row[number] = found["makespan"] if found else None
                 if found and planner == "confab":
-                    accepted[found["accepted"]] += 1
+                    verdict = found["accepted"]
+                    accepted[verdict if isinstance(verdict, bool) else None] += 1
     print(
         "Solved, and makespan over the least of any planner here (geometric mean over the problems that this planner solved):\n"
     )

@@ -36,11 +36,8 @@ class NotTimedError(ValueError):
 
 def duration_in(form: Form) -> PddlWord | Form:
     """Return the number or expression that a ``:duration`` form states; return the lower bound if the form states only bounds."""
-    if form.head == "at" and len(form.items) == 3 and isinstance(form.items[2], Form):  # (at start (= ?duration …))
-        return duration_in(form.items[2])
-    bounds = [form] if form.head != "and" else [one for one in form.items[1:] if isinstance(one, Form)]
     found: dict[str, PddlWord | Form] = {}
-    for one in bounds:
+    for one in _bounds(form):
         if (
             one.head not in ("=", "<=", ">=")
             or len(one.items) != 3
@@ -52,6 +49,18 @@ def duration_in(form: Form) -> PddlWord | Form:
     if chosen is None:
         raise NotTimedError(form, "wanted (= ?duration …)")
     return chosen
+
+
+def _bounds(form: Form) -> Iterator[Form]:
+    """Yield the comparisons of a ``:duration`` form, without their times as in ``(at start (= ?duration …))``."""
+    parts = (
+        form.items[1:] if form.head == "and" else form.items[2:] if form.head == "at" and len(form.items) == 3 else ()
+    )
+    if not parts:
+        yield form
+    for part in parts:
+        if isinstance(part, Form):
+            yield from _bounds(part)
 
 
 def timed(form: Form | None, what: str, duration: PddlWord | Form) -> Iterator[tuple[str, Form]]:

@@ -192,10 +192,10 @@ class _Reader:
             wanted = Form((wanted,), wanted.line, wanted.column)
         if wanted is None:
             raise self.fail(form, "the only metric supported is (:metric minimize …)")
-        if wanted.head != "total-time":
-            if wanted.head != "total-cost":
-                self.number(wanted, {})
-            self.pddl.minimize = wanted
+        cost = _timeless(wanted)
+        if cost is not None and cost.head != "total-cost":
+            self.number(cost, {})
+        self.pddl.minimize = cost
 
     def typed(self, items: Sequence[PddlWord | Form], declaring: bool = False) -> list[Typed]:
         """Return the names with their types in a list such as ``a b - t c``; a name without a type is an ``object``."""
@@ -622,3 +622,16 @@ class _Reader:
 def _formed(at: Form, head: str, *items: PddlWord | Form) -> Form:
     """Return a form (a list of PDDL) with a given first word, at the position of another form."""
     return Form((PddlWord(head, at.line, at.column), *items), at.line, at.column)
+
+
+def _timeless(form: Form) -> Form | None:
+    """Return a metric without its terms in ``(total-time)``, or None if nothing is left."""
+    parts = [_timeless(item) if isinstance(item, Form) else item for item in form.items[1:]]
+    left = [part for part in parts if part is not None]
+    if form.head == "total-time" or (len(left) < len(parts) and (form.head != "+" or not left)):
+        return None
+    return (
+        left[0]
+        if len(left) == 1 < len(parts) and isinstance(left[0], Form)
+        else replace(form, items=(form.items[0], *left))
+    )

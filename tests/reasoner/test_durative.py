@@ -124,6 +124,17 @@ def test_sixty_loaves_are_baked_and_packed_at_the_same_time() -> None:
     assert timed.makespan == 12 and accepted(BAKERY, problem, found, timed)
 
 
+def test_a_metric_may_weigh_the_makespan_beside_a_cost() -> None:
+    problem = "(define (problem p) (:domain d) (:init (= (fuel) 0)) (:goal (done)) (:metric minimize {}))"
+    domain = """(define (domain d) (:predicates (done)) (:functions (fuel))
+      (:durative-action go :parameters () :duration (and (at start (>= ?duration 2)) (at end (<= ?duration 3)))
+        :condition () :effect (and (at end (done)) (at end (increase (fuel) 5)))))"""
+    for metric, cost in (("(+ (* 2 (total-time)) (* 3 (fuel)))", 15), ("(* 2 (total-time))", 1), ("(fuel)", 5)):
+        found = imported(parse(domain, problem.format(metric)))
+        assert found.problem.domain.behaviors["GO"].cost == cost
+        assert planned(found).makespan == 2
+
+
 def test_a_duration_is_calculated_and_a_timed_initial_fact_is_awaited() -> None:
     found = imported(parse(TRUCK, WAY))
     timed = planned(found)
