@@ -31,8 +31,7 @@ ASK {
 
 def write_following(graph: KnowledgeGraph, read: Callable[[], Reading], sparql: str) -> None:
     """Write the initial facts about the derived or remembered situation types in a query into the named graph `DERIVED`."""
-    name = ox.NamedNode(BASE + DERIVED)
-    graph.store.clear_graph(name)
+    graph.store.clear_graph(ox.NamedNode(BASE + DERIVED))
     if not graph.query(DEFINED, SCENE):
         return
     reading = read()
@@ -55,7 +54,7 @@ def write_following(graph: KnowledgeGraph, read: Callable[[], Reading], sparql: 
         triples = list(said(reading, fact, prop, ox.BlankNode(f"follows{count}")))
         about = ox.NamedNode(reading.names.iri(symbol.arguments[0]))
         triples += [ox.Triple(about, ox.NamedNode(TYPE), ox.NamedNode(kind)) for kind in classes[symbol.situation]]
-        graph.store.extend(ox.Quad(one.subject, one.predicate, one.object, name) for one in triples)
+        graph.extend(DERIVED, triples)
 
 
 def _following(problem: Problem, situations: Collection[str]) -> Iterator[Symbol]:

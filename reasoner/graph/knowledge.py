@@ -219,6 +219,11 @@ class KnowledgeGraph:
         name = ox.NamedNode(BASE + graph)
         self.store.extend(ox.Quad(ox.NamedNode(s), ox.NamedNode(p), ox.NamedNode(o), name) for s, p, o in triples)
 
+    def extend(self, graph: str, triples: Iterable[ox.Triple | ox.Quad]) -> None:
+        """Add triples to a named graph of the store."""
+        name = ox.NamedNode(BASE + graph)
+        self.store.extend(ox.Quad(one.subject, one.predicate, one.object, name) for one in triples)
+
     @cached_property
     def path(self) -> Path | None:
         """The scene's file; None if the scene wasn't read from a file."""
@@ -415,13 +420,12 @@ def scene_file(source: str | Path) -> Path:
 def read_into(graph: KnowledgeGraph, file: Path, name: str) -> None:
     """Load a file into a named graph, and add its prefixes."""
     check(f"reading {file}")
-    target = ox.NamedNode(BASE + name)
     with readable(file) as (content, form):
         timed = _TimedInput(content, f"reading {file}")
         if form.supports_datasets:  # all graphs of the file become one graph
-            quads = ox.parse(timed, format=form, base_iri=file.resolve().as_uri())
-            graph.store.extend(ox.Quad(quad.subject, quad.predicate, quad.object, target) for quad in quads)
+            graph.extend(name, ox.parse(timed, format=form, base_iri=file.resolve().as_uri()))
         else:
+            target = ox.NamedNode(BASE + name)
             graph.store.load(input=timed, format=form, base_iri=file.resolve().as_uri(), to_graph=target)
         if any(sign in content for sign in TRIPLE_TERMS) and graph.query(HAS_TRIPLE_TERM, [name]):
             raise KnowledgeError(f"{file}: contains triple terms (RDF 1.2), which OWL doesn't have; remove them")

@@ -28,9 +28,7 @@ class Mirror:
         """Transfer to the graph `asserted` the changes of the world since the last call, and return their number."""
         now = self._lines()
         added, removed = now - self._seen, self._seen - now
-        name = ox.NamedNode(BASE + "asserted")
-        for quad in _parse(added):
-            self.graph.store.add(ox.Quad(quad.subject, quad.predicate, quad.object, name))
+        self.graph.extend("asserted", _parse(added))
         for quad in _parse(removed):
             for graph in SCENE:
                 self.graph.store.remove(ox.Quad(quad.subject, quad.predicate, quad.object, ox.NamedNode(BASE + graph)))

@@ -15,7 +15,7 @@ from urllib.parse import quote
 import pyoxigraph as ox
 
 from confab.reasoner import kinds
-from confab.reasoner.graph.knowledge import BASE, KnowledgeError, KnowledgeGraph, text
+from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, text
 from confab.reasoner.memory.experience_file import MemoryLines, lines, no_such_file
 from confab.reasoner.memory.links import Links
 from confab.reasoner.names import Names
@@ -125,10 +125,9 @@ def _graph(path: Path, found: MemoryLines | None = None) -> KnowledgeGraph:
     """Return the triples of a memory file, except tallies."""
     found = found or memory_lines(path)
     rest = found.rest + found.paper
-    graph, target = KnowledgeGraph(""), ox.NamedNode(BASE + "memory")
+    graph = KnowledgeGraph("")
     try:
-        triples = ox.parse(rest, format=ox.RdfFormat.TURTLE, base_iri=path.resolve().as_uri())
-        graph.store.extend(ox.Quad(q.subject, q.predicate, q.object, target) for q in triples)
+        graph.extend("memory", ox.parse(rest, format=ox.RdfFormat.TURTLE, base_iri=path.resolve().as_uri()))
     except SyntaxError as error:
         why = of_another_kind(path) or f"broken memory: {error}; plan with memory=None, or restore a copy"
         raise KnowledgeError(f"{path}: {why}") from error

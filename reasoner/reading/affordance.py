@@ -87,8 +87,8 @@ class Affordance:
 
 def write_situation(graph: KnowledgeGraph, reading: Reading, state: State | None = None) -> dict[Symbol, str]:
     """Write a state (by default the initial state) and its derived facts into the graph `SITUATION`, and return them."""
-    name, properties = ox.NamedNode(SITUATION), value_properties(graph)
-    graph.store.clear_graph(name)
+    properties = value_properties(graph)
+    graph.store.clear_graph(ox.NamedNode(SITUATION))
     written_facts: dict[Symbol, str] = {}
 
     def write(symbol: Symbol, value: str) -> None:
@@ -96,8 +96,7 @@ def write_situation(graph: KnowledgeGraph, reading: Reading, state: State | None
         if not len(written_facts) % 4096:
             check("writing the situation")
         prop = properties.get(reading.names.iri(symbol.situation))
-        for triple in said(reading, Fact(symbol, value), prop, ox.BlankNode(f"fact{len(written_facts)}")):
-            graph.store.add(ox.Quad(triple.subject, triple.predicate, triple.object, name))
+        graph.extend("situation", said(reading, Fact(symbol, value), prop, ox.BlankNode(f"fact{len(written_facts)}")))
 
     for symbol, value in (state or reading.problem.initial).items():
         write(symbol, value)

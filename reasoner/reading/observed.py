@@ -48,10 +48,8 @@ def save_observed(path: Path, state: State, names: Names, scene: str) -> None:
 
 def assert_observed(graph: KnowledgeGraph, state: State, names: Names) -> None:
     """Replace the contents of the graph `observed` by an observed state."""
-    target = ox.NamedNode(BASE + "observed")
-    graph.store.clear_graph(target)
-    triples = _triples(state, names, graph.scene)
-    graph.store.extend(ox.Quad(t.subject, t.predicate, t.object, target) for t in triples)
+    graph.store.clear_graph(ox.NamedNode(BASE + "observed"))
+    graph.extend("observed", _triples(state, names, graph.scene))
 
 
 def load_observed(path: Path, reading: Reading) -> Reading:

@@ -59,8 +59,7 @@ def with_facts(graph: KnowledgeGraph, reading: Reading, facts: Sequence[Fact]) -
             _remove(copy, about, ox.NamedNode(prop), ox.NamedNode(iri(symbol.arguments[1])) if pair else None)
         for node in _about(copy, reading, symbol):
             _remove(copy, node)
-        added = said(reading, fact, prop, ox.BlankNode())
-        copy.store.extend(ox.Quad(t.subject, t.predicate, t.object, ox.NamedNode(BASE + "asserted")) for t in added)
+        copy.extend("asserted", said(reading, fact, prop, ox.BlankNode()))
     return copy
 
 
@@ -74,17 +73,14 @@ def with_goals(graph: KnowledgeGraph, reading: Reading, goals: Sequence[Fact]) -
 
 def _state_goals(graph: KnowledgeGraph, reading: Reading, goals: Sequence[Fact]) -> None:
     """Add goals to the task of a graph."""
-    asserted, link = ox.NamedNode(BASE + "asserted"), ox.NamedNode(CORE + "goal")
     task = next((text(row[0]) for row in graph.select(TASKS)), f"{graph.scene.rstrip('#/')}#task")
     graph.add("asserted", [(task, TYPE, INDIVIDUAL), (task, TYPE, CORE + "Task")])
     for goal in goals:
         for number, part in enumerate(goal.value.split(",")):  # two bounds of an amount are two goals
             name = ".".join(("goal", *goal.symbol.arguments, goal.symbol.situation, *[str(number)] * bool(number)))
             node = ox.NamedNode(f"{graph.scene.rstrip('#/')}#{as_iri_part(name)}")
-            graph.store.extend(
-                ox.Quad(t.subject, t.predicate, t.object, asserted)
-                for t in (ox.Triple(ox.NamedNode(task), link, node), *_wanted(reading, replace(goal, value=part), node))
-            )
+            graph.add("asserted", [(task, CORE + "goal", node.value)])
+            graph.extend("asserted", _wanted(reading, replace(goal, value=part), node))
 
 
 def without_goals(graph: KnowledgeGraph, reading: Reading, goals: Sequence[Fact]) -> KnowledgeGraph:
@@ -124,9 +120,8 @@ def _unstate_goals(graph: KnowledgeGraph, reading: Reading, symbols: Collection[
 
 def with_refuted(graph: KnowledgeGraph, reading: Reading, refutations: Sequence[Refutation]) -> KnowledgeGraph:
     """Return a copy of a graph with additional refutations, stored in the graph of the scene's geometry."""
-    copy, target = copied(graph), ox.NamedNode(BASE + "reach")
-    added = (triple for one in refutations for triple in refuted(graph, reading, one))
-    copy.store.extend(ox.Quad(t.subject, t.predicate, t.object, target) for t in added)
+    copy = copied(graph)
+    copy.extend("reach", (triple for one in refutations for triple in refuted(graph, reading, one)))
     return copy
 
 
