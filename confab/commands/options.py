@@ -220,22 +220,17 @@ def _stored(context: click.Context, option: click.Parameter, given: tuple[str, .
     context.meta[str(option.name)] = given
 
 
-_FACTS = click.option(
+_change = partial(click.option, multiple=True, expose_value=False, callback=_stored)
+_FACTS = _change(
     "--fact",
     "with_fact",
-    multiple=True,
     metavar="FACT",
-    expose_value=False,
-    callback=_stored,
     help="A fact that replaces the scene's fact about its symbol, e.g. 'cup1 LOCATION location3'; repeatable.",
 )
-_WITHOUT_GOALS = click.option(
+_WITHOUT_GOALS = _change(
     "--without-goal",
     "without_goal",
-    multiple=True,
     metavar="GOAL",
-    expose_value=False,
-    callback=_stored,
     help="A goal of the scene to leave out, by its first words, e.g. 'cup1 LOCATION'; all: every goal; repeatable.",
 )
 
