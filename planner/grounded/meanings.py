@@ -5,7 +5,7 @@ The meaning of a bit is a conjunction of other bits, or several alternatives.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from collections.abc import Set as AbstractSet
 
 import numpy as np
@@ -76,15 +76,14 @@ class Meanings:
             for bit, its in ways.items()
             if means[bit] == (bit,)
         }
-        bits = {bit: Bit(1 << bit, tuple(_mask(found) for found in its)) for bit, its in kept.items()}
+        bits = {bit: Bit(1 << bit, tuple(sum(1 << one for one in found) for found in its)) for bit, its in kept.items()}
         cases = [(found, bit) for bit, its in kept.items() for found in its]
         for bit, opposite in formulas.complements.items():
             if bit in kept and opposite not in ways:
                 bits[opposite] = Bit(1 << opposite, (1 << bit,), opposite=True)
                 cases.append(((), opposite))
         all_of = [means.get(bit, (bit,)) for bit in range(formulas.size)]
-        starts = np.concatenate([[0], np.cumsum([len(found) for found in all_of])]).astype(np.int64)
-        return in_parts(bits), cases, Grouped(starts, np.array([one for found in all_of for one in found], np.int64))
+        return in_parts(bits), cases, Grouped.of(all_of)
 
     def _opposites(self, ways: dict[int, dict[tuple[int, ...], None]], circular: set[int]) -> None:
         """Add the meaning of each negated defined fact that a condition requires, except for recursively defined facts."""
@@ -140,7 +139,3 @@ def expanded(row: Ints, bit: Ints, means: Grouped) -> tuple[Ints, Ints]:
     """Return pairs of a row and a bit; each bit is replaced by the bits of its meaning."""
     counts = np.diff(means.starts)[bit]
     return np.repeat(row, counts), means.items[ranges(means.starts[bit], counts)]
-
-
-def _mask(bits: Sequence[int]) -> int:
-    return sum(1 << bit for bit in bits)

@@ -413,10 +413,10 @@ class _Windows:
             goal=small(wanted),
             costs=[task.costs[operator] for operator in operators],
             owners=[place[task.owners[r]] for r in rows] + [-1] * len(ways),
-            needs=_grouped(
+            needs=Grouped.of(
                 [[new[bit] for bit in found if bit in new] for found in needs + [list(way) for way, _ in ways]]
             ),
-            adds=_grouped([[new[bit] for bit in found if bit in new] for found in adds + [[bit] for _, bit in ways]]),
+            adds=Grouped.of([[new[bit] for bit in found if bit in new] for found in adds + [[bit] for _, bit in ways]]),
             derived=derived.renamed(small),
             change=change,
             describe=lambda operator: task.describe(operators[operator]),
@@ -439,8 +439,8 @@ class _Windows:
             costs=[task.costs[operator] for operator in operators],
             prices={place[operator]: price for operator, price in task.prices.items() if operator in place},
             owners=[place.get(task.owners[r], -1) for r in rows],
-            needs=_grouped([task.needs[r] for r in rows]),
-            adds=_grouped([task.adds[r] for r in rows]),
+            needs=Grouped.of([task.needs[r] for r in rows]),
+            adds=Grouped.of([task.adds[r] for r in rows]),
             change=lambda operator: task.changes_of(operators[operator]),
             describe=lambda operator: task.describe(operators[operator]),
             amounts=replace(amounts, moves=lambda operator: of(operators[operator]), _moves={}),
@@ -457,8 +457,3 @@ class _Windows:
         for r in range(len(self.task), len(self.task.owners)):
             found.setdefault(self.task.owners[r], []).append(r)
         return found
-
-
-def _grouped(lists: Sequence[Sequence[int]]) -> Grouped:
-    starts = np.concatenate([[0], np.cumsum([len(found) for found in lists])]).astype(np.int64)
-    return Grouped(starts, np.array([i for found in lists for i in found], np.int64))

@@ -43,6 +43,12 @@ class Grouped:
     starts: Ints
     items: Ints
 
+    @classmethod
+    def of(cls, lists: Sequence[Sequence[int]]) -> Grouped:
+        """Return the arrays of several lists."""
+        starts = np.concatenate([[0], np.cumsum([len(one) for one in lists])]).astype(np.int64)
+        return cls(starts, np.array(list(itertools.chain.from_iterable(lists)), np.int64))
+
     def __getitem__(self, i: int) -> list[int]:
         """Return the list with the number `i`."""
         found: list[int] = self.items[self.starts[i] : self.starts[i + 1]].tolist()
