@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -310,15 +311,13 @@ def verify(
 
 def on_trust(scene: Known, expected: Sequence[State]) -> dict[str, int]:
     """Return, by situation type, how many changes between successive states no perceiver observes."""
-    counts: dict[str, int] = {}
-    for before, after in pairwise((scene.problem.initial, *expected)):
-        for symbol in {*before, *after}:
-            if (
-                before.get(symbol, FALSE) != after.get(symbol, FALSE)
-                and symbol.situation not in scene.embodiment.perceivers
-            ):
-                counts[symbol.situation] = counts.get(symbol.situation, 0) + 1
-    return dict(sorted(counts.items()))
+    changed = (
+        symbol.situation
+        for before, after in pairwise((scene.problem.initial, *expected))
+        for symbol in {*before, *after}
+        if before.get(symbol, FALSE) != after.get(symbol, FALSE)
+    )
+    return dict(sorted(Counter(name for name in changed if name not in scene.embodiment.perceivers).items()))
 
 
 def require_skills(scene: Known, behaviors: Iterable[str]) -> None:

@@ -11,6 +11,7 @@ class is judged by its superclasses. Preferences for single individuals decay by
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -149,9 +150,7 @@ class Scorer:
             counted = self.totals.get(rule.name, {})
             whole = counted.get(ITSELF, Tally())
             not_ = whole.passed_over + whole.failed
-            spread: dict[str, int] = {}
-            for asks, _ in counted:
-                spread[asks] = spread.get(asks, 0) + 1
+            spread = Counter(asks for asks, _ in counted)
             found = self._weights[rule.name] = {ITSELF: log((whole.chosen + 0.5) / (not_ + 0.5))} if counted else {}
             for fact, tally in counted.items():
                 if fact != ITSELF and spread[fact[0]] > 1:  # otherwise the fact doesn't distinguish candidates
