@@ -144,9 +144,7 @@ def repaired() -> Iterator[Row]:
     trial = Trial.of(served(10))
     for seed in range(80):
         random, kind = Random(seed), KINDS[seed % len(KINDS)]
-        position = random.randrange(len(trial.plan.primitives))
-        happening = random_intervention(trial.problem, trial.states[position], random, kind)
-        assert happening is not None
+        position, happening = random_intervention(trial, random, kind)
         before = replace(trial.problem, initial=trial.states[position])
         now, rest = after_intervention(before, happening), rest_after(trial.plan, position)
         done = repair_or_replan(now, rest, before, None, compiled(now), True, Limits(expansions=20_000))

@@ -52,7 +52,13 @@ def served(objects: int) -> Problem:
         return read(load(path)).problem
 
 
-def random_intervention(problem: Problem, state: State, random: Random, kind: str) -> Intervention | None:
+def random_intervention(trial: Trial, random: Random, kind: str) -> tuple[int, Intervention]:
+    """Return a random position in a plan, and a plausible intervention in the state at the position."""
+    position = random.randrange(len(trial.plan.primitives))
+    return position, _plausible(trial.problem, trial.states[position], random, kind)
+
+
+def _plausible(problem: Problem, state: State, random: Random, kind: str) -> Intervention:
     """Return a plausible intervention in a state.
 
     Two situation types of the first level have values: the places of objects and the contents of vessels. The type for places
@@ -132,9 +138,7 @@ def interventions() -> None:
     begin, longest, wrong = perf_counter(), 0, 0
     for seed in range(SYMBOLIC):
         random, kind = Random(seed), KINDS[seed % len(KINDS)]
-        position = random.randrange(len(trial.plan.primitives))
-        intervention = random_intervention(trial.problem, trial.states[position], random, kind)
-        assert intervention is not None
+        position, intervention = random_intervention(trial, random, kind)
         happening = timed(intervention, trial, position, random.random() < 0.5, position + 0.5)
         episode = act(trial.problem, SymbolicWorld(trial.problem), trial.plan, [happening])
         ends[kind, episode.status.value] += 1
@@ -182,9 +186,7 @@ def physical() -> None:
 def physical_intervention(trial: Trial, seed: int) -> Intervention:
     """Return the intervention of an episode in PyBullet; for half of the seeds, it may happen inside a primitive."""
     random, kind = Random(1000 + seed), KINDS[seed % len(KINDS)]
-    position = random.randrange(len(trial.plan.primitives))
-    intervention = random_intervention(trial.problem, trial.states[position], random, kind)
-    assert intervention is not None
+    position, intervention = random_intervention(trial, random, kind)
     inside, second = random.random() < 0.5, 1 + 30 * random.random()
     return timed(intervention, trial, position, inside, second)
 
@@ -208,9 +210,7 @@ def _repair_row(objects: int, count: int) -> None:
     anew, limits = 0, Limits(seconds=20)
     for seed in range(count):
         random, kind = Random(seed), KINDS[seed % len(KINDS)]
-        position = random.randrange(len(trial.plan.primitives))
-        intervention = random_intervention(problem, trial.states[position], random, kind)
-        assert intervention is not None
+        position, intervention = random_intervention(trial, random, kind)
         rest = rest_after(trial.plan, position)
         before = replace(problem, initial=trial.states[position])
         now = after_intervention(before, intervention)
