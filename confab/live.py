@@ -16,6 +16,10 @@ if TYPE_CHECKING:
 Observer = Callable[[Event], None]
 LOG = 6
 """Maximum number of recent events that the view shows."""
+SIGNS = {
+    "intervention": "✋ ", "discovery": "👁 ", "late": "⌛ ", "repair": "↻ repair: ", "replan": "↻ replan: ", "over": ""
+}  # fmt: skip
+"""The kinds of events in the log, each with the beginning of its line."""
 
 
 @dataclass(repr=False)
@@ -28,16 +32,8 @@ class View:
     def take(self, event: Event) -> None:
         """Record an event."""
         self.event = event
-        if event.what == "intervention":
-            self.log.append(f"✋ {event.text}")
-        elif event.what == "discovery":
-            self.log.append(f"👁 {event.text}")
-        elif event.what == "late":
-            self.log.append(f"⌛ {event.text}")
-        elif event.what in ("repair", "replan"):
-            self.log.append(f"↻ {event.what}: {event.text}")
-        elif event.what == "over":
-            self.log.append(event.text)
+        if event.what in SIGNS:
+            self.log.append(SIGNS[event.what] + event.text)
         for surprise in event.surprises:
             self.log.append(f"≠ {surprise.symbol}: expected {surprise.expected}, observed {surprise.observed}")
 
