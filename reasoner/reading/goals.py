@@ -272,10 +272,11 @@ def _wanted(parts: Parts, iri: str, classes: Mapping[str, tuple[str, ...]]) -> l
 
     If an argument of the node is a class, there is one goal for each member of the class. A hard conjunction denotes its conjuncts.
     """
+    found = parts.condition(iri)
     of_several = iri in parts.nodes and is_a(parts.nodes[iri], "AllOf") and not parts.flag(iri, "negated")
     if of_several and not parts.values(iri, "weight"):
-        return list(parts.conditions(iri, "condition"))
-    found = parts.condition(iri)
+        each = parts.values(iri, "condition")
+        return list(parts.in_order(one for conjunct in each for one in _wanted(parts, conjunct, classes)))
     if not (isinstance(found, Witness) and parts.classes_in(iri)):
         return [found]
     wanted: list[Condition] = [found]
