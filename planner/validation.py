@@ -161,6 +161,9 @@ class _PlanExecution:
         for part in stretches(steps, level):
             check("checking the plan")
             marks.append(len(self.facts.log))
+            if part[0].level <= above:
+                self.fault(part[0].path, f"{part[0]} of level {part[0].level} can't refine {what} of level {above}")
+                return False
             if part[0].level > level:
                 stretch = f"the stretch from {part[0]} to {part[-1]}"
                 done = self.carried_out(part, level, part[0].path, stretch, inside)

@@ -44,9 +44,10 @@ The instances differ in the individuals that the fact doesn't determine.
 
 
 def under_the_levels_above(problem: Problem, plan: Plan, using: Compiled | None = None) -> Plan:
-    """Return a plan of one level in which runs of consecutive steps are grouped under upper-level steps with the same effect.
+    """Return a plan in which runs of consecutive steps are grouped under steps of the levels above with the same effect.
 
-    As few steps as possible stay ungrouped. The result may be invalid; `validate` then rejects the plan.
+    The levels are those above the first step of the plan. As few steps as possible stay ungrouped. The result may be invalid;
+    `validate` then rejects the plan.
     """
     steps = list(plan.steps)
     levels = [level for level in problem.domain.levels if steps and level < steps[0].level]
@@ -75,7 +76,7 @@ def grouped(views: _Views) -> list[Step]:
     while span < 2 * len(points) and any(run not in groups for run in division):
         ungrouped = {begin for begin, end in division if (begin, end) not in groups}
         for run in zip(points, (*points[span:], *points[-1:] * span), strict=False):
-            if run not in groups and not ungrouped.isdisjoint(range(*run)):
+            if run not in groups and views.below(run) and not ungrouped.isdisjoint(range(*run)):
                 found, work = joint_steps(views, run, work)
                 if found and each_takes_place(views, run, found):
                     groups[run] = found
@@ -134,7 +135,7 @@ def runs_of_one_step(views: _Views) -> dict[StepRange, list[Ground]]:
         step_to = {after: step for step, after in views.successors(candidates(views, (begin, last)))}
         for end in views.resting:
             after = views.at[end]
-            if begin < end <= last and after != views.at[begin] and after in step_to:
+            if begin < end <= last and after != views.at[begin] and after in step_to and views.below((begin, end)):
                 found[begin, end] = [step_to[after]]
     return found
 
@@ -310,6 +311,10 @@ class _Views:
     def course_of(self, run: StepRange) -> Sequence[LevelView]:
         """Return the views after each number of primitives of a run."""
         return self.course[self.primitives[run[0]] : self.primitives[run[1]] + 1]
+
+    def below(self, run: StepRange) -> bool:
+        """Return whether all steps of a run are of levels below the upper level."""
+        return all(step.level > self.level for step in self.steps[slice(*run)])
 
     def changing_positions(self) -> list[int]:
         """Return the positions at rest whose view differs from the previous one, with the first and the last position."""

@@ -218,6 +218,12 @@ def test_the_checker_reports_each_kind_of_fault_of_a_step() -> None:
         )
 
 
+def test_no_step_refines_a_step_of_its_own_level() -> None:
+    problem = shelves(has("FULL", "?c", FALSE))
+    (fault,) = validate(problem, Plan((replace(step(1), steps=(replace(step(1), path=(0, 0)),)),)))
+    assert fault.text == "0 DO cup1 of level 1 can't refine 0 DO cup1 of level 1"
+
+
 def test_the_checker_reports_no_faults_after_a_step_that_is_not_applicable() -> None:
     problem = replace(shelves(has("FULL", "?c", FALSE)), goal={Symbol("AT", ("cup1",)): "floor"})
     for wrong in (step(1, "DONE"), step(1, "DO", "cup2", id=1)):
