@@ -46,8 +46,9 @@ from worlds.scenes import scene
 from worlds.slices import Slice
 from worlds.walking import cost, faults
 
-SECONDS, CPU = 3.0, 4.0
-"""Time limit of a call in seconds, and CPU seconds after which the call counts as endless."""
+SECONDS, CPU, COMPARING = 3.0, 4.0, 30.0
+"""Time limit of a call in seconds; CPU seconds after which a call counts as endless; the same for a comparison with exhaustive
+searches."""
 MOST = 5_000
 """Maximum number of nodes of the exhaustive search."""
 OPTIMAL, PAPER, STRICT, EXPORTS, EXECUTIONS, LESSONS, READERS, CERTIFICATES, RECOGNITION = 3, 2, 3, 8, 6, 8, 250, 4, 8
@@ -220,11 +221,11 @@ class Judge:
                 found.known = False
         found.seconds["truth"] = process_time() - begin
 
-    def call(self, mode: str, made: Callable[[], T]) -> T | None:
+    def call(self, mode: str, made: Callable[[], T], cpu: float = CPU) -> T | None:
         """Return the result of a call; record a fault if the call doesn't return in time or raises an unexpected error."""
         begin = process_time()
         try:
-            with limited(CPU):
+            with limited(cpu):
                 return made()
         except EndlessError:
             self.found.status[mode] = "endless"
@@ -291,9 +292,9 @@ class Judge:
         if self.sampled(EXECUTIONS, "execute", "execute"):
             self.execution(read, guarded)
         if self.sampled(RECOGNITION, "recognition", "recognition"):
-            self.call("recognition", lambda: self.recognition(self.slices(read)))
+            self.call("recognition", lambda: self.recognition(self.slices(read)), COMPARING)
             self.call("recognition of names", lambda: self.names(self.renamed(file)))
-            self.call("recognition of a crowd", lambda: self.recognition(self.crowd(file)))
+            self.call("recognition of a crowd", lambda: self.recognition(self.crowd(file)), COMPARING)
 
     def outcome(self, read: Scene, name: str, **options: Any) -> Outcome | None:
         """Plan in one mode, compare the outcome with the exhaustive search, and return the outcome."""

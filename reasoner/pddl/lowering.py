@@ -21,12 +21,13 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from itertools import chain, combinations
 
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, bounds, situations_in, terms_of
 from confab.reasoner.amounts import inside as parts
 from confab.reasoner.derivation import circular
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.language import is_variable, terms
+from confab.reasoner.language import is_variable, mentions, terms
 from confab.reasoner.pddl.absence import NegationPredicates
 from confab.reasoner.pddl.formulas import FALSE as NEVER
 from confab.reasoner.pddl.formulas import TRUE as ALWAYS
@@ -199,7 +200,8 @@ class Lowering:
     def cases(self, behavior: Behavior) -> Iterator[Behavior]:
         """Yield behaviours that together are equivalent to a behaviour: one for each case of the behaviour's conditional effects.
 
-        An effect is split only if its condition states the value of a single symbol that has at most `CASES` other values.
+        An effect on a value is split only if its condition states the value of a single symbol that has at most `CASES` other
+        values. For effects on amounts, see `added`.
         """
         for effect in behavior.effects:
             match effect.when:
@@ -224,7 +226,53 @@ class Lowering:
                         return
                 case _:
                     continue
+        yield from self.added(behavior)
+
+    def added(self, behavior: Behavior) -> Iterator[Behavior]:
+        """Yield behaviours, each of which states for each two effects on bounded amounts whether both change the same amount.
+
+        The bounds limit the sum of the changes of an amount, so the terms of these changes must be equal.
+        """
+        outer = [*map(named, behavior.preconditions), {p.name for p in behavior.parameters}]
+        bound = set[str]().union(*outer)
+        for one, other in combinations(behavior.amounts, 2):
+            quantity = self.words.situations[one.situation].quantity
+            if one.situation != other.situation or one.situation in self.totals or not (quantity and quantity.bounded):
+                continue
+            differ = [pair for pair in zip(one.arguments, other.arguments, strict=True) if pair[0] != pair[1]]
+            if any(self.distinct(behavior, *pair) for pair in differ):
+                continue
+            whens = [effect.when for effect in (one, other) if effect.when] if one.when != other.when else []
+            conditions = [c for when in whens for c in when]
+            if not bound.issuperset(t for t in chain(*differ, *map(mentions, conditions)) if is_variable(t)):
+                raise KnowledgeError(
+                    f"{behavior.name} changes {one.situation} by two effects that may concern the same individual, and PDDL "
+                    "can't limit their sum; write an effect for each individual to export the behaviour"
+                )
+            if differ:
+                term, known = differ[0] if is_variable(differ[0][0]) else differ[0][::-1]
+                equal = EqualityCondition(term, known)
+                amounts = tuple(
+                    replace(effect, arguments=tuple(known if a == term else a for a in effect.arguments))
+                    for effect in behavior.amounts
+                )
+                yield from self.added(replace(_asking(behavior, equal), amounts=amounts))
+                yield from self.added(_asking(behavior, replace(equal, negated=True)))
+                return
+            if whens:
+                made = tuple(replace(e, when=()) if e.when == whens[0] else e for e in behavior.amounts)
+                left = tuple(e for e in behavior.amounts if e.when != whens[0])
+                yield from self.added(replace(_asking(behavior, *whens[0]), amounts=made))
+                yield from self.added(replace(_asking(behavior, AnyOf((whens[0],), negated=True)), amounts=left))
+                return
         yield behavior
+
+    def distinct(self, behavior: Behavior, one: str, other: str) -> bool:
+        """Return whether two different terms of a behaviour denote different individuals."""
+        apart = {EqualityCondition(one, other, True), EqualityCondition(other, one, True)}
+        return not apart.isdisjoint(behavior.preconditions) or self.kept.members(behavior, one).isdisjoint(
+            self.kept.members(behavior, other)
+        )
 
     def total(self, behavior: Behavior, situation: str, arguments: Sequence[str]) -> bool:
         """Return whether the symbols of a situation type exist for all individuals that the arguments can denote."""
@@ -502,6 +550,11 @@ class Lowering:
         at = words.amount(symbol.situation, its)
         exists = words.exists(symbol.situation, its)
         return both([exists, *(Compare(sign, at, limit) for sign, limit in bounds(wanted))])
+
+
+def _asking(behavior: Behavior, *conditions: Condition) -> Behavior:
+    """Return a behaviour with further preconditions."""
+    return replace(behavior, preconditions=(*behavior.preconditions, *conditions))
 
 
 def named(condition: Condition) -> set[str]:

@@ -124,6 +124,22 @@ def test_several_effects_of_a_behaviour_on_one_amount_add_up(seed: int, tmp_path
     assert not Judge(world, tmp_path, meant=meant).judged().complaints
 
 
+SHARES = {"constrained": 0.3, "mutual": 0.2, "priced": 0.2, "everyone": 0.1, "repeated": 0.2}
+
+
+@pytest.mark.parametrize(
+    ("seed", "mode"),
+    [
+        pytest.param(901_002_424, "export", id="the bounds of an amount limit the sum of two effects on it"),
+        pytest.param(906_000_532, "guarded", id="a goal on a class inside a conjunction is a goal of each individual"),
+        pytest.param(901_003_374, "guarded", id="no step refines a step of its own level"),
+    ],
+)
+def test_a_world_that_had_a_wrong_answer_has_none(seed: int, mode: str, tmp_path: Path) -> None:
+    world, meant = drawn(seed, **SHARES)
+    assert not Judge(world, tmp_path, only=mode, meant=meant).judged().complaints
+
+
 @pytest.mark.usefixtures("unlimited_judge")
 def test_the_part_that_recognition_selects_has_the_same_costs_and_names_as_the_whole_world(tmp_path: Path) -> None:
     for seed in range(8_400_000, 8_400_006):
