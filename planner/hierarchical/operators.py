@@ -158,11 +158,7 @@ class Program:
 
     def size(self, level: int) -> int:
         """Return an upper bound on the number of quantified behaviours of a level."""
-        classes = self.problem.classes
-        return sum(
-            prod(len(classes.get(parameter.kind, ())) for parameter in behavior.parameters)
-            for behavior in self.domain.at_level(level)
-        )
+        return quantified(self.problem, level)
 
     def changing(self, level: int) -> list[SituationType]:
         """Return the situation types that effects of a level change, except boolean situation types."""
@@ -366,6 +362,14 @@ class Program:
                 kind = self.problem.members(condition.kind)
                 found = found - kind if condition.negated else found & kind
         return found
+
+
+def quantified(problem: Problem, level: int) -> int:
+    """Return an upper bound on the number of quantified behaviours of a level."""
+    return sum(
+        prod(len(problem.classes.get(parameter.kind, ())) for parameter in behavior.parameters)
+        for behavior in problem.domain.at_level(level)
+    )
 
 
 def named(problem: Problem, rests: bool = True) -> list[str]:

@@ -26,6 +26,7 @@ from time import perf_counter
 
 from confab.planner.hierarchical.agenda import Agenda
 from confab.planner.hierarchical.call import Call, Compiled, as_refined, compiled
+from confab.planner.hierarchical.operators import quantified
 from confab.planner.hierarchical.scope import BITS, MAKING
 from confab.planner.hierarchical.shortening import ORDERS, shortened
 from confab.planner.hierarchical.unsolvability import FINALLY
@@ -45,10 +46,13 @@ The maximum work corresponds to a few seconds.
 """
 FLAT_ROWS = 30_000
 """Maximum number of rows of a join when a task of one level is grounded as a whole."""
+VAST = 1_000_000
+"""Number of quantified behaviours of a task of one level above which the task is first searched without grounding."""
 TRIALS = 1_000_000
-"""Maximum number of trials if a level can't be grounded; a trial is the test of one behaviour in one state."""
+"""Maximum number of trials if a level can't be grounded (about ten seconds); a trial tests one behaviour in one state."""
 BRIEFLY = 16
-"""The lowest level is searched as a whole, during a restart, with the effort so far divided by this number."""
+"""The divisor of the effort so far with which the lowest level is searched as a whole during a restart, and the divisor of `TRIALS`
+for a task of one level before planning goal by goal."""
 NOT_LEFT = "levels must not be left"
 SEARCHING, SHORTENING = 0.93, 0.85
 """Shares of the time limit after which the search ends, and after which a plan isn't shortened any more.
@@ -113,8 +117,9 @@ def _plan(
 ) -> Outcome:
     deadline, until = limits.end(SEARCHING), limits.end(SHORTENING)
     one_level = improve > 0 and len(problem.domain.levels) == 1
+    vast = one_level and quantified(problem, problem.domain.levels[0]) > VAST
     flat = None
-    if one_level and advised is alone and first is None:
+    if one_level and not vast and advised is alone and first is None:
         flat = flat_first(problem, limits, deadline)  # saves compiling thousands of conditional effects
         if flat.status is Status.SOLVED and deadline is None:
             return flat
@@ -133,12 +138,16 @@ def _plan(
             return call.outcome(Status.GAVE_UP, reason=Reason("a quick search found no steps that extend the plan"))
         done = resumed or (one_level and by_rules_alone(call))
         if one_level and not done:
+            done = vast and without_grounding(call, TRIALS // BRIEFLY).plan is not None
+        if one_level and not done:
             flat = flat or flat_first(problem, limits, deadline)
             call.count(flat)
             if flat.status is Status.UNSOLVABLE or (flat.status is Status.SOLVED and deadline is None):
                 return replace(call.outcome(flat.status, flat.plan, flat.reason), bound=flat.bound)
             if flat.plan is not None:
                 call.steps, call.bound, done = as_refined(call, flat.plan.steps), flat.bound, True
+            elif not vast:
+                done = without_grounding(call, TRIALS // BRIEFLY).plan is not None
         if done or agenda.achieve_all():
             call.space.most_work, call.space.deadline = math.inf, before_the_check(call, until)
             plan = shortened(call, improve, leave_levels, advised) if improve else call.tree()
@@ -194,7 +203,9 @@ def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool) -> Outcome:
     if agenda.proofs.too_large is None:
         flat = lowest_alone(call, limits, BITS * limits.work)
     else:
-        flat = step_by_step(call, limits, f"planning goal by goal found no plan, and {agenda.proofs.too_large.text}")
+        flat = without_grounding(
+            call, TRIALS, f"planning goal by goal found no plan, and {agenda.proofs.too_large.text}"
+        )
     if flat.status is Status.GAVE_UP and flat.reason is not None:
         return given_up(call, flat.reason.text)
     plans = () if flat.plan is None else regroupings(problem, flat.plan, lowest, call.using)
@@ -204,21 +215,15 @@ def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool) -> Outcome:
     return call.outcome(flat.status, plan, flat.reason)
 
 
-def step_by_step(call: Call, limits: Limits, why: str) -> Outcome:
-    """Search the lowest level like the paper's mode, which needs no grounding; `why` is the reason why the level isn't grounded.
+def without_grounding(call: Call, trials: int, why: str = "") -> Outcome:
+    """Search the lowest level without grounding; `why` is the reason of the outcome if the search finds no plan."""
+    from confab.planner.hierarchical.ungrounded import UngroundedSearch
 
-    The number of states is bounded, because each behaviour is tried in each state.
-    """
-    from confab.planner.paper.hierarchy import plan as paper
-
-    lowest = call.program.levels[-1]
-    states = min(limits.expansions, TRIALS // max(call.program.size(lowest), 1))
-    if not states:
+    steps = UngroundedSearch(call, trials).plan()
+    if steps is None:
         return Outcome(Status.GAVE_UP, reason=Reason(why))
-    bounded = replace(limits, expansions=states).until(call.space.deadline)
-    found = paper(call.problem, limits=bounded, levels=[lowest])
-    call.count(found)
-    return found if found.plan is not None else replace(found, status=Status.GAVE_UP, reason=Reason(why))
+    call.steps = steps
+    return Outcome(Status.SOLVED, call.tree())
 
 
 def given_up(call: Call, why: str) -> Outcome:

@@ -1,0 +1,289 @@
+"""Search of one level without grounding, for levels with too many quantified behaviours.
+
+In a state, the applicable behaviours are found by joins: generated Python code binds the parameters of a behaviour one after
+another from the facts of the state, the static relations and the classes, whichever has the fewest candidates.
+
+The states with the fewest unmet goals are expanded first. Among these states, novel states come first, and then the oldest state,
+so that plans are short. A state is novel if it has a fact that no earlier state with as many unmet goals had. A successor with
+fewer unmet goals is expanded at once. If a state has only one successor, the search goes on to this successor without ranking the
+state.
+
+The method is best-first width search without grounding (Corrêa and Seipp, "Best-first width search for lifted classical planning",
+ICAPS 2022).
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import reduce
+from itertools import islice, product
+from math import prod
+from operator import xor
+from typing import NamedTuple, TypeAlias
+
+from confab.planner.generated import identifier, tuple_written, written
+from confab.planner.hierarchical.call import Call
+from confab.planner.hierarchical.operators import CodeBlock, Program
+from confab.planner.hierarchical.refinement import RefinedStep
+from confab.planner.plan import Counts
+from confab.planner.transitions import Cell, Change, Table
+from confab.reasoner.language import is_variable, mentions, needs
+from confab.reasoner.symbols import AnyOf, Behavior, Condition, EqualityCondition, RelationCondition, ValueCondition
+
+TRIAL = 10
+"""The work of a trial in the unit of the budget."""
+MOST_FORCED = 1_000
+"""Maximum number of states in a row that aren't ranked, since they have only one successor."""
+MOST_COMBINED = 16
+"""Maximum number of combinations of alternatives of a behaviour that are joined separately."""
+Join: TypeAlias = "Callable[[], Iterator[tuple[str, ...]]]"
+"""Function that yields arguments with which a behaviour may be applicable in the current state of a table."""
+
+
+class Move(NamedTuple):
+    """An applicable behaviour with its changes."""
+
+    behavior: str
+    arguments: tuple[str, ...]
+    bindings: tuple[str, ...]
+    changes: list[Change]
+
+
+@dataclass(frozen=True)
+class Reached:
+    """A reached state: the moves and the changes that lead from the state `before` to this state, and a hash of the state."""
+
+    unmet: int
+    hash: int = 0
+    changes: Mapping[Cell, str] = field(default_factory=dict)
+    moves: tuple[Move, ...] = ()
+    before: Reached | None = None
+
+
+class UngroundedSearch:
+    """The search of the lowest level from the initial state of a call.
+
+    `trials` counts the arguments that were tried for behaviours; at most `most` are tried. States with the same hash count as the
+    same state.
+    """
+
+    def __init__(self, call: Call, most: int) -> None:
+        self.call, self.table, self.space, self.most = call, call.table, call.space, most
+        self.level = call.program.levels[-1]
+        self.trials, self.counts = 0, Counts()
+        self.joins = joins(call.program, self.level, self.table)
+        self.facts: dict[tuple[int, Cell], set[str]] = {}
+        self.seen: set[int] = set()
+        self.open: list[tuple[int, bool, int, Reached, Iterator[Move] | None]] = []
+
+    def plan(self) -> list[RefinedStep] | None:
+        """Return steps that achieve the goals and leave the changed symbols at rest, or None if the search finds none."""
+        end, moves = self._end(), list[Move]()
+        self.space.spend(self.level, self.counts, TRIAL * self.trials)
+        while end is not None:
+            moves[:0] = end.moves
+            end = end.before
+        return [RefinedStep(self.level, move.behavior, move.arguments, move.bindings, ()) for move in moves] or None
+
+    def _end(self) -> Reached | None:
+        """Return a state that ends a plan, or None."""
+        self.table.undo(0)
+        self._push(Reached(self._unmet()))
+        while self.open and self.trials < self.most:
+            unmet, _, _, state, successors = heapq.heappop(self.open)
+            self.space.check_time()
+            self._return_to(state)
+            if successors is None:
+                self.counts.expanded += 1
+                successors = iter(list(self._moves()))
+            for move in successors:
+                mark = len(self.table.trail)
+                after = self._after(state, move)
+                if after is not None:
+                    if not after.unmet and self._at_rest():
+                        return after
+                    self._push(after, after.changes if after.unmet == unmet else self.table.since(0))
+                self.table.undo(mark)
+                if after is not None and after.unmet < unmet:
+                    self._push(state, successors=successors)
+                    break
+        return None
+
+    def _after(self, state: Reached, move: Move) -> Reached | None:
+        """Apply a move, and further moves as long as there is only one; return the new state, or None if it isn't new."""
+        mark, moves = len(self.table.trail), [move]
+        while True:
+            self.space.apply(moves[-1].changes)
+            unmet = self._unmet()
+            following = list(islice(self._moves(), 2)) if unmet else []
+            if len(following) != 1 or len(moves) == MOST_FORCED:
+                break
+            moves += following
+        old, new = self.table.changes(mark)
+        key = reduce(xor, map(hash, (*old.items(), *new.items())), state.hash)
+        if key in self.seen or (unmet and not following):
+            return None
+        self.seen.add(key)
+        self.counts.generated += 1
+        return Reached(unmet, key, new, tuple(moves), state)
+
+    def _moves(self) -> Iterator[Move]:
+        """Yield the applicable behaviours that change the current state."""
+        now, forward = self.table.now, self.space.forward
+        for name, join in self.joins.items():
+            tried = set[tuple[str, ...]]()
+            for arguments in join():
+                if arguments in tried:
+                    continue
+                tried.add(arguments)
+                self.trials += 1
+                found = forward[name](*arguments)
+                if found is not None and any(now[s].get(key) != value for s, key, value in found[1]):
+                    yield Move(name, arguments, *found)
+
+    def _unmet(self) -> int:
+        return sum(not self.call.met(cell) for cell in self.call.goal)
+
+    def _at_rest(self) -> bool:
+        """Return whether each symbol without a goal has its rest value or its initial value in the current state."""
+        changed = self.table.since(0).keys() - self.call.goal
+        return all(changed.isdisjoint(self.call.restless(level)) for level in self.call.program.levels[1:])
+
+    def _return_to(self, state: Reached) -> None:
+        """Make a state the current state of the table."""
+        self.table.undo(0)
+        path: list[Mapping[Cell, str]] = []
+        one: Reached | None = state
+        while one is not None:
+            path.append(one.changes)
+            one = one.before
+        for changes in reversed(path):
+            self.table.put_all(changes)
+
+    def _push(
+        self, state: Reached, facts: Mapping[Cell, str] | None = None, successors: Iterator[Move] | None = None
+    ) -> None:
+        """Put a state into the open list; it is novel if one of the facts is new among states with as many unmet goals."""
+        novel = not facts
+        for cell, value in (facts or {}).items():
+            values = self.facts.setdefault((state.unmet, cell), set())
+            novel = novel or value not in values
+            values.add(value)
+        heapq.heappush(self.open, (state.unmet, not novel, len(self.seen), state, successors))
+
+
+# ----------------------------------------------------------------------------------------------------------------- joins
+
+
+def joins(program: Program, level: int, table: Table) -> Mapping[str, Join]:
+    """Return the joins of the behaviours of a level, bound to a table; the joins suit the present numbers of facts in the table."""
+    sizes = {(name, value): len(keys) for name, values in table.holders.items() for value, keys in values.items()}
+    bind = program.writer.function(_lines(program, level, sizes), "applicable")
+    found: Mapping[str, Join] = bind(table.now, table.holders)
+    return found
+
+
+def _lines(program: Program, level: int, sizes: Mapping[tuple[str, str], int]) -> Iterator[str]:
+    """Yield the lines that define the functions `Join` of the behaviours of a level in the dictionary `applicable`."""
+    yield "applicable = {}"
+    for behavior in program.domain.at_level(level):
+        name = identifier("join", behavior.name)
+        yield f"def {name}():"
+        yield "    if False: yield ()"
+        for conditions in _alternatives(behavior.preconditions):
+            for line in _joined(program, behavior, conditions, sizes):
+                yield "    " + line
+        yield f"applicable[{behavior.name!r}] = {name}"
+
+
+def _alternatives(conditions: Sequence[Condition]) -> Iterable[Sequence[Condition]]:
+    """Return conjunctions, one of which holds if the given conditions hold: each has one alternative of each `AnyOf`."""
+    choices = [c for c in conditions if isinstance(c, AnyOf) and not c.negated]
+    if prod(len(c.alternatives) for c in choices) > MOST_COMBINED:
+        return [conditions]
+    others = [c for c in conditions if c not in choices]
+    return [
+        [*others, *(c for group in groups for c in group)] for groups in product(*(c.alternatives for c in choices))
+    ]
+
+
+def _joined(
+    program: Program, behavior: Behavior, conditions: Sequence[Condition], sizes: Mapping[tuple[str, str], int]
+) -> list[str]:
+    """Return the lines that yield the arguments with which conditions may hold, by a loop for each source of candidates."""
+    writer, kinds, block = program.writer, behavior.kinds, CodeBlock()
+    waiting, bound, tests = list(conditions), set[str](), list[str]()
+    parameters = [p.name for p in behavior.parameters]
+    while True:
+        while ready := next((c for c in waiting if _open_terms(c, kinds) <= bound), None):
+            waiting.remove(ready)
+            tests.append(writer.expression(ready, bound, kinds, behavior.name))
+        if tests:
+            block.open(f"if {' and '.join(f'({test})' for test in tests)}:")
+        if bound.issuperset(parameters):
+            block.add(f"yield {tuple_written(map(written, parameters))}")
+            return block.lines
+        loop, terms = _loop(program, behavior, waiting, bound, sizes)
+        block.open(loop)
+        tests = [f"{written(term)} == {source}" for term, source in terms if term in bound or not is_variable(term)]
+        fresh = {term: source for term, source in reversed(terms) if is_variable(term) and term not in bound}
+        for term, source in fresh.items():
+            block.add(f"{written(term)} = {source}")
+            tests.append(writer.member(term, kinds[term]))
+        tests += [f"{written(term)} == {source}" for term, source in terms if term in fresh and source != fresh[term]]
+        bound.update(fresh)
+
+
+def _open_terms(condition: Condition, kinds: Mapping[str, str]) -> set[str]:
+    """Return the terms that must be bound before a condition is tested; `kinds` contains the terms of the behaviour."""
+    if isinstance(condition, ValueCondition) and not condition.negated:
+        return needs(condition)
+    return mentions(condition) & kinds.keys()
+
+
+def _loop(
+    program: Program,
+    behavior: Behavior,
+    waiting: Sequence[Condition],
+    bound: set[str],
+    sizes: Mapping[tuple[str, str], int],
+) -> tuple[str, list[tuple[str, str]]]:
+    """Return the head of a loop over the fewest candidates for unbound terms, and the terms, each with its expression."""
+    found: list[tuple[float, str, list[tuple[str, str]]]] = []
+    for condition in waiting:
+        match condition:
+            case EqualityCondition(left, right, False):
+                for term, other in ((left, right), (right, left)):
+                    if is_variable(term) and term not in bound and (other in bound or not is_variable(other)):
+                        found.append((0.5, f"for t in ({written(other)},):", [(term, "t")]))
+            case RelationCondition(relation, arguments, False):
+                unbound = {a for a in arguments if is_variable(a)} - bound
+                for term in sorted(unbound):
+                    if arguments.count(term) == 1:
+                        text, fan = program.writer.adjacent(relation, arguments, term, unbound)
+                        found.append((fan, f"for t in {text}:", [(term, "t")]))
+            case ValueCondition(situation, arguments, value, False) if situation not in program.domain.rules:
+                given = not is_variable(value) or value in bound
+                keys = (
+                    [(arguments[0], "t")] if len(arguments) == 1 else [(a, f"t[{i}]") for i, a in enumerate(arguments)]
+                )
+                size = sum(
+                    number
+                    for (name, one), number in sizes.items()
+                    if name == situation and (one == value or is_variable(value))
+                )
+                if given and program.writer.listed(situation, value):
+                    text = f"{identifier('holders', situation)}.get({written(value)}, ())"
+                    found.append((max(size, 1.0), f"for t in {text}:", keys))
+                elif not given:
+                    text = f"{identifier('now', situation)}.items()"
+                    found.append((max(size, 1.0), f"for t, u in {text}:", [*keys, (value, "u")]))
+    for parameter in behavior.parameters:
+        if parameter.name not in bound:
+            members = program.problem.classes.get(parameter.kind, ())
+            text = program.writer.constant(("members", parameter.kind), members)
+            found.append((len(members) + 1.0, f"for t in {text}:", [(parameter.name, "t")]))
+    _, head, terms = min(found, key=lambda entry: entry[0])
+    return head, terms
