@@ -42,7 +42,7 @@ Join: TypeAlias = "Callable[[], Iterator[tuple[str, ...]]]"
 """Function that yields arguments with which a behaviour may be applicable in the current state of a table."""
 
 
-class Move(NamedTuple):
+class GroundMove(NamedTuple):
     """An applicable behaviour with its changes."""
 
     behavior: str
@@ -52,14 +52,14 @@ class Move(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Reached:
+class UngroundedState:
     """A reached state: the moves and the changes that lead from the state `before` to this state, and a hash of the state."""
 
     unmet: int
     hash: int = 0
     changes: Mapping[Cell, str] = field(default_factory=dict)
-    moves: tuple[Move, ...] = ()
-    before: Reached | None = None
+    moves: tuple[GroundMove, ...] = ()
+    before: UngroundedState | None = None
 
 
 class UngroundedSearch:
@@ -76,21 +76,21 @@ class UngroundedSearch:
         self.joins = joins(call.program, self.level, self.table)
         self.facts: dict[tuple[int, Cell], set[str]] = {}
         self.seen: set[int] = set()
-        self.open: list[tuple[int, bool, int, Reached, Iterator[Move] | None]] = []
+        self.open: list[tuple[int, bool, int, UngroundedState, Iterator[GroundMove] | None]] = []
 
     def plan(self) -> list[RefinedStep] | None:
         """Return steps that achieve the goals and leave the changed symbols at rest, or None if the search finds none."""
-        end, moves = self._end(), list[Move]()
+        end, moves = self._end(), list[GroundMove]()
         self.space.spend(self.level, self.counts, TRIAL * self.trials)
         while end is not None:
             moves[:0] = end.moves
             end = end.before
         return [RefinedStep(self.level, move.behavior, move.arguments, move.bindings, ()) for move in moves] or None
 
-    def _end(self) -> Reached | None:
+    def _end(self) -> UngroundedState | None:
         """Return a state that ends a plan, or None."""
         self.table.undo(0)
-        self._push(Reached(self._unmet()))
+        self._push(UngroundedState(self._unmet()))
         while self.open and self.trials < self.most:
             unmet, _, _, state, successors = heapq.heappop(self.open)
             self.space.check_time()
@@ -111,7 +111,7 @@ class UngroundedSearch:
                     break
         return None
 
-    def _after(self, state: Reached, move: Move) -> Reached | None:
+    def _after(self, state: UngroundedState, move: GroundMove) -> UngroundedState | None:
         """Apply a move, and further moves as long as there is only one; return the new state, or None if it isn't new."""
         mark, moves = len(self.table.trail), [move]
         while True:
@@ -127,9 +127,9 @@ class UngroundedSearch:
             return None
         self.seen.add(key)
         self.counts.generated += 1
-        return Reached(unmet, key, new, tuple(moves), state)
+        return UngroundedState(unmet, key, new, tuple(moves), state)
 
-    def _moves(self) -> Iterator[Move]:
+    def _moves(self) -> Iterator[GroundMove]:
         """Yield the applicable behaviours that change the current state."""
         now, forward = self.table.now, self.space.forward
         for name, join in self.joins.items():
@@ -141,7 +141,7 @@ class UngroundedSearch:
                 self.trials += 1
                 found = forward[name](*arguments)
                 if found is not None and any(now[s].get(key) != value for s, key, value in found[1]):
-                    yield Move(name, arguments, *found)
+                    yield GroundMove(name, arguments, *found)
 
     def _unmet(self) -> int:
         return sum(not self.call.met(cell) for cell in self.call.goal)
@@ -151,11 +151,11 @@ class UngroundedSearch:
         changed = self.table.since(0).keys() - self.call.goal
         return all(changed.isdisjoint(self.call.restless(level)) for level in self.call.program.levels[1:])
 
-    def _return_to(self, state: Reached) -> None:
+    def _return_to(self, state: UngroundedState) -> None:
         """Make a state the current state of the table."""
         self.table.undo(0)
         path: list[Mapping[Cell, str]] = []
-        one: Reached | None = state
+        one: UngroundedState | None = state
         while one is not None:
             path.append(one.changes)
             one = one.before
@@ -163,7 +163,10 @@ class UngroundedSearch:
             self.table.put_all(changes)
 
     def _push(
-        self, state: Reached, facts: Mapping[Cell, str] | None = None, successors: Iterator[Move] | None = None
+        self,
+        state: UngroundedState,
+        facts: Mapping[Cell, str] | None = None,
+        successors: Iterator[GroundMove] | None = None,
     ) -> None:
         """Put a state into the open list; it is novel if one of the facts is new among states with as many unmet goals."""
         novel = not facts
