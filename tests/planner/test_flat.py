@@ -299,7 +299,7 @@ def test_the_tree_of_many_operators_with_a_symbol_each_grows_with_their_number()
         assert applicable.of(1 << 7)[0] == [7]
         return process_time() - began
 
-    assert seconds(20_000) < 40 * max(seconds(2_000), 0.01)
+    assert seconds(20_000) < 5
 
 
 def test_a_lookahead_replaces_a_step_that_is_not_applicable() -> None:
@@ -358,6 +358,10 @@ def test_a_problem_of_one_level_is_planned_as_a_whole_unless_it_is_too_large(
     assert outcome.plan is not None
     assert validate(lift, outcome.plan) == []
     monkeypatch.setattr(fast, "FLAT", 0)
+    outcome = fast.plan(lift)  # without grounding
+    assert outcome.plan is not None
+    assert validate(lift, outcome.plan) == []
+    monkeypatch.setattr(fast, "TRIALS", 0)
     with pytest.raises(AssertionError, match="goals in series"):
         fast.plan(lift)
 
