@@ -118,6 +118,8 @@ def values_at_fault(state: State, domain: Domain, declared: Container[str]) -> I
         quantity = domain.situations[symbol.situation].quantity
         if quantity is not None and (limits := _limits(value, quantity)):
             name, remedy = symbol.situation, "state such an amount"
+            if value == domain.situations[name].default:
+                remedy += f", or correct the c:defaultAmount of {name}"
             if name in domain.constraints:
                 constraint = domain.constraints[name]
                 yield Impossible(

@@ -651,6 +651,11 @@ class Problem:
         """Return a class with all its superclasses."""
         return closure([kind], lambda each: self.parents.get(each, ()))
 
+    def below(self, kind: str, other: str) -> bool:
+        """Return whether every individual of a class or union of classes belongs to another class or union."""
+        above = {*other.split("|"), other}
+        return not any(self.superclasses(part).isdisjoint(above) for part in kind.split("|"))
+
     @cached_property
     def individuals(self) -> frozenset[str]:
         """All individuals of the problem's classes."""

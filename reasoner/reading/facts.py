@@ -176,10 +176,12 @@ def initial_state(
                 continue  # e.g. a distance exists only if it is stated
             values = sorted(stated.get(symbol, ())) or [v for v in [situation.default] if v]
             if len(values) != 1:
+                default = "c:defaultAmount" if situation.quantity else "c:defaultValue"
                 what = f"several values ({', '.join(values)})" if values else "no value"
                 wrong = "" if values else _of_two_classes(domain, classes, situation, arguments)
                 raise KnowledgeError(
-                    f"{symbol} has {what}; {wrong}state a value in the scene, or a default of {situation.name}"
+                    f"{symbol} has {what}; {wrong}state "
+                    + ("one of them" if values else f"a value in the scene, or a {default} of {situation.name}")
                 )
             initial[symbol] = values[0]
     members = {kind: frozenset(those) for kind, those in classes.items()}

@@ -25,6 +25,7 @@ from confab.reasoner.reading.remembering import Past, iris_of_the_past, past, re
 from confab.reasoner.reading.rows import (
     HIGHEST_LEVEL,
     HIGHEST_NUMBER,
+    NOT_OF_AMOUNTS,
     Member,
     OntologySchema,
     classes_of,
@@ -411,6 +412,9 @@ def _situations(
             properties[iri_of_property] = (name, iri in schema.pairs)
         if quantity := _quantity(schema, iri, iri in read.whole):
             boolean = False
+            for prop, remedy in NOT_OF_AMOUNTS.items():
+                if schema.nodes[iri].get(prop):
+                    raise KnowledgeError(f"{name} is an amount, and has a c:{local_name(prop)}; {remedy}", iri)
         rest = schema.values(iri, "restValue")
         default = schema.values(iri, "defaultValue") or rest
         found.append(

@@ -43,6 +43,13 @@ DATA |= {CORE + name for name in ("leastAmount", "mostAmount", "defaultAmount")}
 DATA |= {CORE + name for name in ("duration", "by", "happensAt", "availableFrom", "availableUntil")}
 """Core properties whose values are literals; the values of all other core properties are nodes."""
 OF_ONTOLOGIES = frozenset({CORE + "symbolicOnly", CORE + "inputsHash"})
+NOT_OF_AMOUNTS = {
+    CORE
+    + "restValue": "only situation types whose values are individuals have rest values; name an individual, or, for an "
+    "amount, drop c:restValue; c:defaultAmount states the amount of each object for which the scene states none",
+    CORE + "defaultValue": "only individuals are default values; write c:defaultAmount for a number",
+}
+"""Properties of situation types that amounts don't have, each with a reason and the remedy."""
 HIGHEST_LEVEL = 1_000
 HIGHEST_COST = 10**9
 HIGHEST_NUMBER = 10**9
@@ -152,8 +159,11 @@ def link(row: Sequence[Term], blank: bool = False) -> Triple:
         raise KnowledgeError(f"a node without a name has a value of {local_name(text(predicate))}; name the individual")
     if not (isinstance(value, ox.NamedNode) or (blank and isinstance(value, ox.BlankNode))):
         what = f"the text '{text(value)[:60]}'" if isinstance(value, ox.Literal) else "a node without a name"
+        said, number = f"<{text(subject)}>: {local_name(text(predicate))}", NOT_OF_AMOUNTS.get(text(predicate))
+        if number and isinstance(value, ox.Literal) and exact(text(value)) is not None:
+            raise KnowledgeError(f"{said} is the number {text(value)}; {number}")
         raise KnowledgeError(
-            f"<{text(subject)}>: {local_name(text(predicate))} has {what} as its value; name an individual instead"
+            f"{said} has {what} as its value; name an individual instead"
             + (", without quotation marks" if isinstance(value, ox.Literal) else "")
         )
     return text(subject), text(predicate), text(value)

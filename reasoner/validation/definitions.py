@@ -257,3 +257,26 @@ def _items(expressions: Mapping[str, NodeValues], node: str) -> Iterator[str]:
             seen.add(cell)
             yield from expressions[cell].get(RDF + "first", ())
             cells += expressions[cell].get(RDF + "rest", ())
+
+
+def earlier_states_of_others(case: ReadCase) -> Iterator[Fault]:
+    """Find situation types whose condition about earlier states concerns a situation type of other individuals."""
+    schema, names, problem = case.reading.schema, case.names, case.problem
+    kinds = {*problem.classes, *problem.parents}
+    for iri in schema.of_kind("SituationType"):
+        for word, never in (("onlyAfter", "be true"), ("remembers", "become true")):
+            for other in schema.nodes[iri].get(CORE + word, ()):
+                one, two = (problem.domain.situations[names.short(each)] for each in (iri, other))
+                for mine, its in zip(one.arguments, two.arguments, strict=True):
+                    if problem.members(mine) & problem.members(its):
+                        continue
+                    if any(problem.below(kind, mine) and problem.below(kind, its) for kind in kinds):
+                        continue
+                    yield (
+                        iri,
+                        f"{one.name} of the class {mine} has c:{word} {two.name} of the class {its}, but the classes have no "
+                        "common individual",
+                        f"c:{word} compares the two situation types for the same individuals, so {one.name} can never {never}",
+                        f"name a situation type of {mine} in c:{word}; if {its} is meant, define such a type by a c:Rule, as in "
+                        f"CONSTRUCT {{ ?x :NEW true }} WHERE {{ ?x a :{mine} . ?y a :{its} ; :{two.name} true … }}",
+                    )

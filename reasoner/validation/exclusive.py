@@ -121,7 +121,7 @@ class _Exclusive:
             case Witness(variable, kind, inner, True):
                 has = ValueCondition(self.situation, (variable,), value)
                 other = {EqualityCondition(variable, own, True), EqualityCondition(own, variable, True)}
-                return self.below(self.kind, kind) and has in inner and {*inner} <= {has, *other}
+                return self.problem.below(self.kind, kind) and has in inner and {*inner} <= {has, *other}
             case ValueCondition(situation, (about,), truth, negated):
                 return (about, truth, negated) in ((value, TRUE, True), (value, FALSE, False)) and any(
                     any(self._has(c, rule.parameters[0].name) for c in rule.conditions) and len(rule.conditions) == 1
@@ -135,7 +135,7 @@ class _Exclusive:
             case ValueCondition(self.situation, (_,), of, False):
                 return of == value
             case Witness(variable, kind, (ValueCondition(self.situation, (about,), of, False),), False):
-                return about == variable and of == value and self.below(self.kind, kind)
+                return about == variable and of == value and self.problem.below(self.kind, kind)
             case _:
                 return False
 
@@ -218,7 +218,7 @@ class _Exclusive:
     def inside(self, excluding: _Taken, term: str, behavior: Behavior) -> bool:
         """Return whether a term certainly denotes one of the values that define the state `excluding`."""
         if term[:1] == "?":
-            return bool(excluding.kind) and self.below(behavior.kinds.get(term, ""), excluding.kind)
+            return bool(excluding.kind) and self.problem.below(behavior.kinds.get(term, ""), excluding.kind)
         return term == excluding.value or term in self.problem.classes.get(excluding.kind, ())
 
     def may_be_inside(self, excluding: _Taken, term: str, behavior: Behavior) -> bool:
@@ -229,10 +229,5 @@ class _Exclusive:
         members = {*self.problem.classes.get(kind, ())}
         if excluding.value:
             return excluding.value in members
-        both = self.below(kind, excluding.kind) or self.below(excluding.kind, kind)
+        both = self.problem.below(kind, excluding.kind) or self.problem.below(excluding.kind, kind)
         return both or not members.isdisjoint(self.problem.classes.get(excluding.kind, ()))
-
-    def below(self, kind: str, other: str) -> bool:
-        """Return whether every individual of a class or union of classes belongs to another class or union."""
-        above = {*other.split("|"), other}
-        return not any(self.problem.superclasses(part).isdisjoint(above) for part in kind.split("|"))

@@ -35,6 +35,8 @@ RULES_ON_PROBLEMS: dict[str, Callable[[ReadCase], Iterator[Fault]]] = {
     "unit-mismatch": quantities.unlike_units,
     "duration-unit": times.durations_in_other_units,
     "window-too-short": times.windows_too_short,
+    "actor-left-out": times.actors_left_out,
+    "earlier-state-of-others": definitions.earlier_states_of_others,
     "product-of-amounts": quantities.multiplied_amounts,
     "conclusion-outside-class": definitions.conclusions_outside_class,
     "number-missing": quantities.numbers_missing,
@@ -54,5 +56,5 @@ WARNINGS = frozenset(
     }
 )
 """Rules whose findings don't prevent planning."""
-REMARKS = frozenset({"defined"})
-"""Rules whose findings are information about the ontology and not faults."""
+REMARKS = frozenset({"actor-left-out", "defined"})
+"""Rules whose findings are choices of the author or information about the ontology, and not faults."""

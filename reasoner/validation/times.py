@@ -9,6 +9,7 @@ from fractions import Fraction
 
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure
 from confab.reasoner.symbols import Behavior, Problem, Timing
+from confab.reasoner.timing import timing_of
 from confab.reasoner.validation.case import Fault, ReadCase
 
 SECONDS = ("", "s", "sec", "second", "seconds")
@@ -43,6 +44,27 @@ def _names(problem: Problem, behavior: Behavior, individual: str) -> bool:
         behavior.kinds[actor] for actor in actors if actor in behavior.kinds
     ]
     return individual in actors or any(individual in problem.members(kind) for kind in kinds)
+
+
+def actors_left_out(case: ReadCase) -> Iterator[Fault]:
+    """Find primitives that name no actor, but have a term of a class whose individuals are actors of another primitive."""
+    domain = case.problem.domain
+    primitives = domain.at_level(domain.levels[-1]) if domain.levels else ()
+    acting = [(one, one.kinds[actor]) for one in primitives for actor in timing_of(one).actors if actor in one.kinds]
+    for behavior in primitives:
+        if timing_of(behavior).actors:
+            continue
+        for other, kind in acting:
+            terms = [term for term, its in behavior.kinds.items() if case.problem.below(its, kind)]
+            if terms:
+                term = terms[0].removeprefix("?")
+                yield (
+                    case.names.iri(behavior.name),
+                    f"{behavior.name} names no actor, but has a term of {kind} ({term}), of which {other.name} names a c:actor",
+                    f"only an actor does one step at a time; {behavior.name} may overlap other steps of the same individual",
+                    f"state the c:actor of {behavior.name}, as in c:actor :{behavior.name}.{term}; if it needs no actor, nothing",
+                )
+                break
 
 
 def durations_in_other_units(case: ReadCase) -> Iterator[Fault]:

@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -297,3 +298,38 @@ def test_the_file_is_read_only_a_few_times_for_many_findings(tmp_path: Path, mon
     errors = quick_errors(loaded.knowledge)
     assert len({error.line for error in errors}) == 200
     assert reads.count(scene) < 10
+
+
+@pytest.mark.parametrize("said", ["c:restValue 2.0", "c:restValue c:true", "c:defaultValue 2.0"])
+def test_one_finding_and_one_message_explain_that_an_amount_has_a_default_amount_only(
+    said: str, tmp_path: Path
+) -> None:
+    fault = next(fault for fault in FAULTS if fault.title == "a rest value of an amount")
+    scene = seed(replace(fault, new=fault.new.replace("c:restValue 2.0", said)), tmp_path)
+    (finding,) = (finding for finding in validate([scene]) if finding.serious and finding.rule != "no-value")
+    assert finding.rule == "rest-value-of-amount"
+    assert "c:defaultAmount" in finding.remedy
+    with pytest.raises(KnowledgeError, match="c:defaultAmount"):
+        confab.load(scene).plan()
+
+
+def test_only_a_primitive_with_an_individual_that_acts_elsewhere_is_asked_for_its_actor(tmp_path: Path) -> None:
+    fault = next(fault for fault in FAULTS if fault.rule == "actor-left-out")
+    for more, asked in (("", {"B1_WASH"}), (" :B1_WASH c:actor :B1_WASH.item .", set())):
+        findings = found(replace(fault, new=fault.new + more), tmp_path)
+        assert {one.node.rpartition("#")[2] for one in findings if one.rule == "actor-left-out"} == asked
+    place = found(replace(fault, new=":B1_CARRY c:actor :B1_CARRY.place ."), tmp_path)
+    assert {one.node.rpartition("#")[2] for one in place if one.rule == "actor-left-out"} == {"B1_WASH"}
+
+
+@pytest.mark.parametrize(
+    ("shared", "asked"),
+    [("", True), (":Basin a owl:Class ; rdfs:subClassOf :Item, :Sink .", False)],
+    ids=["no common class", "a common class"],
+)
+def test_an_earlier_state_of_other_individuals_is_a_fault_unless_an_individual_can_be_both(
+    shared: str, asked: bool, tmp_path: Path
+) -> None:
+    fault = next(fault for fault in FAULTS if fault.rule == "earlier-state-of-others")
+    rules = [one.rule for one in found(replace(fault, new=f"{fault.new}\n{shared}"), tmp_path)]
+    assert (fault.rule in rules) == asked
