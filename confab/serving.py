@@ -64,7 +64,7 @@ log = logging.getLogger(__name__)
 transport_log = log.getChild("transport")
 transport_log.setLevel(logging.CRITICAL + 1)
 T = TypeVar("T")
-PORT = 7879
+PORT, HIGHEST_PORT = 7879, 65_535
 LANES, AT_ONCE = (0.05, 0.5, 5.0, None), 2
 """Time limits of the lanes in seconds, and maximum number of concurrent queries in each lane."""
 LARGEST, SLOWEST = 1_000_000, 20.0
@@ -492,6 +492,10 @@ def serving(scene: Known, port: int = PORT, limits: QueryLimits | None = None) -
     """
     if scene.knowledge.remote:
         raise KnowledgeError(f"{scene.iri} is at an endpoint already; ask that one")
+    if type(port) is not int or not 0 <= port <= HIGHEST_PORT:
+        raise KnowledgeError(
+            f"port {port!r} is no port; wanted a whole number from 1 to {HIGHEST_PORT}, or 0 for a free port"
+        )
     service = Service(scene, limits or QueryLimits())
     try:
         listening = socket.create_server(("127.0.0.1", port), backlog=1024)

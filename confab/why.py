@@ -366,7 +366,8 @@ def why_not(
     if worded is not None:
         if plan is None:
             raise KnowledgeError(
-                f"there is no plan with a step that '{asked}' could replace; wanted a goal: 'object SITUATION value'"
+                f"'{asked}' is a behaviour, which can replace a step of a plan, but there is no plan; ask why there is none "
+                "(confab explain SCENE, in Python plan().explain()), or ask for a goal: 'object SITUATION value'"
             )
         try:
             found = instead_of(problem, plan, worded[0], dict(worded[1]), ask, instead)

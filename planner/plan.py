@@ -177,6 +177,8 @@ class Plan(Sequence[Step], metaclass=RightNames):
 
     def at_level(self, level: int) -> tuple[Step, ...]:
         """Return the steps of one level in the order of execution; steps that are refined together follow each other."""
+        if not isinstance(level, int):
+            raise TypeError(f"at_level({level!r}): wanted the number of a level")
         return tuple(step for node in self.walk() if node.level == level for step in node.together)
 
     @property

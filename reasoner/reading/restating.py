@@ -13,6 +13,7 @@ import pyoxigraph as ox
 
 from confab.reasoner.amounts import bounds, written
 from confab.reasoner.condition_nodes import Properties, equality_properties, symbol_properties, triples
+from confab.reasoner.derivation import TASK
 from confab.reasoner.files import as_iri_part
 from confab.reasoner.graph.knowledge import BASE, SCENE, KnowledgeError, KnowledgeGraph, text
 from confab.reasoner.possible import ImpossibleStateError, refuse_derived, refuse_impossible
@@ -64,8 +65,20 @@ def with_facts(graph: KnowledgeGraph, reading: Reading, facts: Sequence[Fact]) -
 
 
 def with_goals(graph: KnowledgeGraph, reading: Reading, goals: Sequence[Fact]) -> KnowledgeGraph:
-    """Return a copy of a graph in which the given goals replace the goals for the same symbols."""
+    """Return a copy of a graph in which the given goals replace the goals for the same symbols.
+
+    Raises
+    ------
+    KnowledgeError
+        A goal isn't a fact, but stands for the conditions of a compound goal.
+    """
     copy = copied(graph)
+    for goal in goals:
+        if reading.problem.domain.situations[goal.symbol.situation].arguments == (TASK,):
+            raise KnowledgeError(
+                f"'{goal}' stands for the conditions of {goal.symbol.situation}, and only facts can be given as goals; "
+                "with_goal keeps this goal of the scene; without_goal removes it; a file can state other conditions"
+            )
     others = _unstate_goals(copy, reading, {goal.symbol for goal in goals})
     _state_goals(copy, reading, [*others, *goals])
     return copy

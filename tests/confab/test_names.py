@@ -16,11 +16,13 @@ import pytest
 
 import confab
 import confab.why  # its classes have an overview, too
+from confab import ontology
 from confab.cli import main
 from confab.guessing import groups, hint, known, listed
 from confab.hints import COMMANDS, HINTS, OVERVIEW
 from confab.planner.plan import Plan
 from confab.planner.timed.plan import TimedPlan
+from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.names import public_names
 from confab.reasoner.symbols import Fact
 from confab.sim.verdict import Verdict
@@ -483,3 +485,42 @@ def test_the_error_on_a_variable_of_a_query_as_parameter_tells_how_to_state_its_
         scene.query("SELECT ?place { ?object k:location ?place }", object="cup1")  # type: ignore[call-arg]
     where = "SELECT ?place { VALUES ?object { :cup1 } ?object k:location ?place }"
     assert len(scene.query(where)) == 1
+
+
+@pytest.mark.parametrize("port", ["x", -1, 1.5, 99_999, True])
+def test_a_wrong_port_is_refused_with_the_possible_ports(port: object) -> None:
+    with pytest.raises(KnowledgeError, match=r"is no port; wanted a whole number from 1 to 65535, or 0"):
+        confab.load("beverage-serving").serve(port).__enter__()  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("level", ["x", 1.0, None])
+def test_a_level_that_is_no_number_is_refused(level: object) -> None:
+    plan = confab.load("beverage-serving").plan().plan
+    with pytest.raises(TypeError, match=r"at_level\(\) got level=.*; wanted a whole number"):
+        plan.at_level(level)  # type: ignore[arg-type]
+
+
+def test_a_time_limit_of_a_block_has_to_be_given() -> None:
+    with pytest.raises(TypeError, match=r"within\(\): wanted seconds as a number"), confab.within():
+        pass
+
+
+def test_a_goal_with_alternatives_is_no_fact_for_with_goal(tmp_path: Path) -> None:
+    text = (ontology.ROOT / "scenes" / "wishes-small.ttl").read_text("utf-8")
+    old = 'c:Comparison ; c:weight 8.0 ; c:about :store ; c:situationType d:STOCK ; c:sign "=" ; c:amount 0.0'
+    same = old.replace("c:weight 8.0 ; ", "")
+    new = f"c:AnyOf ; c:alternative :one, :two . :one a {same} . :two a {same} . :order.rest a owl:NamedIndividual"
+    (tmp_path / "scene.ttl").write_text(text.replace(old, new), "utf-8")
+    scene = confab.load(tmp_path / "scene.ttl")
+    with pytest.raises(KnowledgeError, match=r"only facts can be given as goals; with_goal keeps this goal"):
+        scene.with_goal("order order.goal3 true")
+    assert "order order.goal3 true" in scene.with_goal("glass IN store").goals
+
+
+def test_a_question_about_a_behavior_without_a_plan_names_the_command_that_tells_why_there_is_none(
+    tmp_path: Path,
+) -> None:
+    text = (ontology.ROOT / "scenes" / "wishes-small.ttl").read_text("utf-8")
+    (tmp_path / "scene.ttl").write_text(text.replace("d:weight 7.0", "d:weight 700.0"), "utf-8")
+    with pytest.raises(KnowledgeError, match=r"L1_PICK_UP.*there is no plan; ask why there is none \(confab explain"):
+        confab.load(tmp_path / "scene.ttl").plan().why_not("L1_PICK_UP")
