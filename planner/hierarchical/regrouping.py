@@ -188,29 +188,32 @@ def each_takes_place(views: _Views, run: StepRange, steps: Sequence[Ground]) -> 
 
     A step begins at the first change of one of its symbols after the earlier steps with the same symbol have ended. It ends when
     all facts that it makes true hold. In some state in between, the step has to be applicable if its own symbols still have their
-    values from the begin. A symbol whose value the upper level doesn't see counts with this value, or with its last visible value.
+    values from the begin. A passing value is one that the symbol has neither before nor after any of the steps, or that the upper
+    level doesn't see. A symbol with a passing value counts with this value, or with its last other value.
     """
     begin, end = views.primitives[run[0]], views.primitives[run[1]]
     course, ended = views.course, dict[int, int]()
-    visible = {begin: course[begin]}
-    for p in range(begin, end):
-        visible[p + 1] = tuple(now or before for now, before in zip(course[p + 1], visible[p], strict=True))
-    view = course[begin]
+    stated = [course[begin]]
     for step in steps:
-        views.enter(run[0], view)
-        after = next((after for _, after in views.successors([step])), view)
+        views.enter(run[0], stated[-1])
+        stated.append(next((after for _, after in views.successors([step])), stated[-1]))
+    lasting = [set(values) - {""} for values in zip(*stated, strict=True)]
+    settled = {begin: course[begin]}
+    for p in range(begin, end):
+        pairs = zip(course[p + 1], settled[p], lasting, strict=True)
+        settled[p + 1] = tuple(now if now in values else before for now, before, values in pairs)
+    for step, view, after in zip(steps, stated, stated[1:], strict=False):
         own = {i for i, _ in views.new_facts(view, after)}
         since = max((ended.get(i, begin) for i in own), default=begin)
         first = next((p for p in range(since, end) if any(course[p][i] != course[p + 1][i] for i in own)), end)
         last = next((p for p in range(first + 1, end) if all(course[p][i] == after[i] for i in own)), end)
         if own and not any(
-            views.applicable(p, tuple(visible[first][i] if i in own else v for i, v in enumerate(now)), step)
+            views.applicable(p, tuple(settled[first][i] if i in own else v for i, v in enumerate(now)), step)
             for p in range(first, last)
-            for now in (course[p], visible[p])
+            for now in (course[p], settled[p])
         ):
             return False
         ended.update(dict.fromkeys(own, last))
-        view = after
     return True
 
 

@@ -188,3 +188,66 @@ def test_a_cup_is_not_filled_before_it_is_moved_where_level_1_moves_no_filled_cu
         next(i for i, s in enumerate(plan.primitives) if s.behavior == name) for name in ("B3_PUT_DOWN", "B3_TILT")
     )
     assert moved < filled
+
+
+STATIONS = """
+@prefix : <https://example.org/stations#> .
+@prefix c: <https://w3id.org/confab/core#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+<https://example.org/stations> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> ; c:symbolicOnly true .
+:Item a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object ; c:hasSituationType :AT, :WASHED, :DRIED .
+:Place a owl:Class, owl:NamedIndividual ; rdfs:subClassOf :AT, :ROBOT_AT .
+:Rack a owl:Class, owl:NamedIndividual ; rdfs:subClassOf :Place .
+:Sink a owl:Class, owl:NamedIndividual ; rdfs:subClassOf :Place .
+:Dryer a owl:Class, owl:NamedIndividual ; rdfs:subClassOf :Place .
+:Robot a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object, :AT ; c:hasSituationType :ROBOT_AT .
+:AT a owl:Class, owl:NamedIndividual, c:SituationType ; c:valueProperty :at .
+:at a owl:ObjectProperty, owl:FunctionalProperty ; rdfs:domain :Item ; rdfs:range :AT .
+:ROBOT_AT a owl:Class, owl:NamedIndividual, c:SituationType ; c:valueProperty :robotAt ; c:fromLevel 2 .
+:robotAt a owl:ObjectProperty, owl:FunctionalProperty ; rdfs:domain :Robot ; rdfs:range :ROBOT_AT .
+:WASHED a owl:Class, owl:NamedIndividual, c:SituationType .
+:DRIED a owl:Class, owl:NamedIndividual, c:SituationType .
+:L1_WASH a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 1 ; c:update '''
+  INSERT { ?item :WASHED true } WHERE { ?item a :Item ; :at ?home . ?home a :Rack }''' .
+:L1_DRY a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 2 ; c:update '''
+  INSERT { ?item :DRIED true } WHERE { ?item a :Item ; :WASHED true ; :at ?home . ?home a :Rack }''' .
+:L1_STORE a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 3 ; c:update '''
+  DELETE { ?item :at ?from } INSERT { ?item :at ?to }
+  WHERE { ?item a :Item . ?to a :Place . ?item :DRIED true ; :at ?from . ?from a :Rack FILTER(?from != ?to) }''' .
+:L2_GO a owl:NamedIndividual, c:Behavior ; c:level 2 ; c:index 1 ; c:update '''
+  DELETE { ?robot :robotAt ?from } INSERT { ?robot :robotAt ?to }
+  WHERE { ?robot a :Robot . ?to a :Place . ?robot :robotAt ?from FILTER(?from != ?to) }''' .
+:L2_TAKE a owl:NamedIndividual, c:Behavior ; c:level 2 ; c:index 2 ; c:update '''
+  DELETE { ?item :at ?place } INSERT { ?item :at ?robot }
+  WHERE { ?robot a :Robot . ?item a :Item ; :at ?place . ?place a :Place . ?robot :robotAt ?place
+    FILTER NOT EXISTS { ?other a :Item ; :at ?robot } }''' .
+:L2_PUT a owl:NamedIndividual, c:Behavior ; c:level 2 ; c:index 3 ; c:update '''
+  DELETE { ?item :at ?robot } INSERT { ?item :at ?place }
+  WHERE { ?item a :Item ; :at ?robot . ?robot a :Robot ; :robotAt ?place . ?place a :Place }''' .
+:L2_WASH a owl:NamedIndividual, c:Behavior ; c:level 2 ; c:index 4 ; c:update '''
+  INSERT { ?item :WASHED true } WHERE { ?item a :Item ; :at ?sink . ?sink a :Sink }''' .
+:L2_DRY a owl:NamedIndividual, c:Behavior ; c:level 2 ; c:index 5 ; c:update '''
+  INSERT { ?item :DRIED true } WHERE { ?item a :Item ; :WASHED true ; :at ?dryer . ?dryer a :Dryer }''' .
+:cup a owl:NamedIndividual, :Item ; c:index 1 ; :at :rack .
+:robot a owl:NamedIndividual, :Robot ; c:index 2 ; c:fromLevel 2 ; :robotAt :rack .
+:rack a owl:NamedIndividual, :Rack ; c:index 3 .
+:sink a owl:NamedIndividual, :Sink ; c:index 4 .
+:dryer a owl:NamedIndividual, :Dryer ; c:index 5 .
+:shelf a owl:NamedIndividual, :Place ; c:index 6 .
+[ a owl:AllDifferent ; owl:distinctMembers ( :cup :dryer :rack :robot :shelf :sink ) ] .
+:task a owl:NamedIndividual, c:Task ; c:goal :task.washed, :task.dried, :task.stored .
+:task.washed a owl:NamedIndividual, c:ValueCondition ; c:about :cup ; c:situationType :WASHED .
+:task.dried a owl:NamedIndividual, c:ValueCondition ; c:about :cup ; c:situationType :DRIED .
+:task.stored a owl:NamedIndividual, c:ValueCondition ; c:about :cup ; c:situationType :AT ; c:value :shelf .
+"""
+"""On level 1, an item is washed, dried and stored from a rack; level 1 also sees the stations of each refinement."""
+
+
+def test_an_item_goes_from_station_to_station_if_level_1_takes_each_step_from_its_rack(tmp_path: Path) -> None:
+    (tmp_path / "stations.ttl").write_text(STATIONS, "utf-8")
+    scene = confab.load(tmp_path / "stations.ttl")
+    result = scene.plan()
+    assert result.plan.length == {1: 3, 2: 11}
+    assert not result.faults(result.plan)
+    assert sum(len(node.together) == 3 for node in result.plan) == 1
