@@ -6,9 +6,10 @@ window. An operator is near if few steps lead from the start of the window to th
 the end of the window. The search is A* with h_FF (`confab.planner.grounded.shortest`). A state is dropped if, according to h,
 no cheaper plan leads through the state.
 
-Windows of steps are tried on the given plan and on a regrouped plan, in which each step follows a step on which it depends. The
-given order is kept if the other order saves nothing. Finally, the remaining work is spent on the whole plan as one window, with all
-operators and a greater weight of h. Of two equally cheap plans, the plan with fewer steps counts as cheaper (`TRIFLE`).
+First, the order of all steps may change (`confab.planner.grounded.routes`). Windows of steps are tried on the resulting plan and on
+a regrouped plan, in which each step follows a step on which it depends. The given order is kept if the other order saves nothing.
+Finally, the remaining work is spent on the whole plan as one window, with all operators and a greater weight of h. Of two equally
+cheap plans, the plan with fewer steps counts as cheaper (`TRIFLE`).
 
 Work is counted in examined operators instead of seconds. Therefore the result is the same on every machine.
 
@@ -32,6 +33,7 @@ from numpy.typing import NDArray
 from confab.planner.grounded.amounts import Amounts, Linear
 from confab.planner.grounded.hff import cost_left
 from confab.planner.grounded.joins import Ints
+from confab.planner.grounded.routes import rerouted
 from confab.planner.grounded.shortest import shortest, ways
 from confab.planner.grounded.task import BitChange, Grouped, Task, bits_of
 from confab.planner.plan_costs import TRIFLE
@@ -49,13 +51,17 @@ The maximum number of evaluations is `EVALUATIONS`, or the work divided by `SHAR
 """
 WEIGHT = 3
 """Weight of h_FF when the whole plan is searched again with all operators."""
+REMAINING = 4
+"""Divisor of the work that remains for windows if another route made the plan cheaper."""
 TRIALS = 2_000_000
 """Maximum number of replayed operators when superfluous steps are removed."""
 LOOK, BITS = 50, 400
 """Number of operators that are ranked, and of bits that are renumbered, in the time in which one operator is examined."""
 
 
-def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None = None) -> list[int]:
+def shorter(
+    task: Task, plan: Sequence[int], work: int, deadline: float | None = None, routes: bool = True
+) -> list[int]:
     """Return a plan that costs at most as much as the given plan.
 
     The result is a cheapest plan if a search of few states proves this; otherwise some windows of steps may be replaced.
@@ -69,6 +75,8 @@ def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None =
         Maximum number of examined operators; the function examines half a million to a million operators per second.
     deadline : float, optional
         The deadline on the clock of `time.perf_counter`.
+    routes : bool
+        Whether the order of all steps may change, in a plan of the lowest level (`confab.planner.grounded.routes`).
     """
     if task.prices or len(set(task.costs)) > 1 or not any(task.costs):
         prices = {operator: price.plus(Linear((), Fraction(TRIFLE))) for operator, price in task.prices.items()}
@@ -79,6 +87,9 @@ def shorter(task: Task, plan: Sequence[int], work: int, deadline: float | None =
         best, proved = cheapest(task, best, work, deadline)
         if proved:
             return best
+    if routes and task.level == task.problem.domain.levels[-1]:
+        before, best = task.cost_of(best), rerouted(task, best, work, deadline)
+        work //= REMAINING if task.cost_of(best) < before else 1
     windows = _Windows(task, work, max(EVALUATIONS, work // SHARE), deadline)
     while True:
         before = task.cost_of(best)

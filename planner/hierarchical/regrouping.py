@@ -36,6 +36,11 @@ LONGEST = 60
 """Maximum number of steps that are grouped under one step of the level above."""
 WORK = 100_000
 """Maximum number of upper-level steps that are tried in the search for steps with the same joint effect as a run."""
+BRIEFLY = 10
+"""Work of the first search for the steps of a run: this number times the square of the number of upper-level steps to try.
+
+Most runs without such steps need much more work, because every subset of the steps leads to another state.
+"""
 MOST_FILLED = 1_000
 """Maximum number of instances of a behaviour that are tried for one fact.
 
@@ -72,15 +77,22 @@ def grouped(views: _Views) -> list[Step]:
     end = len(views.steps)
     division = best_division(groups, end)
     points = views.changing_positions()
-    span, work = 1, WORK
-    while span < 2 * len(points) and any(run not in groups for run in division):
-        ungrouped = {begin for begin, end in division if (begin, end) not in groups}
-        for run in zip(points, (*points[span:], *points[-1:] * span), strict=False):
-            if run not in groups and views.below(run) and not ungrouped.isdisjoint(range(*run)):
-                found, work = joint_steps(views, run, work)
+    work, refuted = WORK, set[StepRange]()
+    for briefly in (True, False):
+        span = 1
+        while span < 2 * len(points) and any(run not in groups for run in division):
+            ungrouped = {begin for begin, end in division if (begin, end) not in groups}
+            for run in zip(points, (*points[span:], *points[-1:] * span), strict=False):
+                if run in groups or run in refuted or not views.below(run) or ungrouped.isdisjoint(range(*run)):
+                    continue
+                most = min(work, BRIEFLY * len(candidates(views, run)) ** 2) if briefly else work
+                found, left = joint_steps(views, run, most)
+                work -= most - left
                 if found and each_takes_place(views, run, found):
                     groups[run] = found
-        division, span = best_division(groups, end), 2 * span
+                elif left > 0:
+                    refuted.add(run)
+            division, span = best_division(groups, end), 2 * span
     return [node(views, run, groups[run]) if run in groups else views.steps[run[0]] for run in division]
 
 
@@ -148,6 +160,8 @@ def joint_steps(views: _Views, run: StepRange, work: int) -> tuple[list[Ground],
     """
     course, tried = views.course_of(run), candidates(views, run)
     first, last = course[0], course[-1]
+    if any(before and not after for before, after in zip(first, last, strict=True)):
+        return [], work  # the run hides a value, which no upper-level step does
     holding_at: dict[frozenset[tuple[int, str]], list[int]] = {}  # after how many primitives new facts hold together
     before: dict[LevelView, tuple[LevelView, Ground]] = {}
     waiting = [(0, 0, 0, first)]

@@ -34,15 +34,23 @@ MOST_ROWS, OF_A_STEP = 20_000, 500
 
 
 def windowed(call: Call, level: int, work: int) -> None:
-    """Replace steps of a level in a call's plan by cheaper steps, if that improves the plan (`improves`)."""
-    new = cheaper(call, level, work)
-    if new is None:
-        return
+    """Replace steps of a level in a call's plan by cheaper steps, if that improves the plan (`improves`).
+
+    On the lowest level, the order of all steps may change. If the new plan isn't better, only windows of steps are replaced.
+    """
+    for routes in (True, False) if level == call.program.levels[-1] else (False,):
+        new = cheaper(call, level, work, routes)
+        if new is None or replaced(call, level, new):
+            return
+
+
+def replaced(call: Call, level: int, new: Sequence[Ground]) -> bool:
+    """Refine and group new steps of a level; if that improves a call's plan, replace the plan and return True."""
     other = fresh_call(call, call.problem)
     for name, arguments in new:
         step = other.refiner.do(level, name, arguments)
         if step is None:
-            return
+            return False
         other.steps.append(step)
     if not all(map(other.met, other.goal)):  # goals that the level doesn't see are open
         Agenda(other, call.program.levels[:1], quickly=True, trial=True).achieve_all()
@@ -50,11 +58,12 @@ def windowed(call: Call, level: int, work: int) -> None:
     for plan in regroupings(problem, other.tree(), level, call.using):
         if improves(problem, plan, old, level) and not validate(problem, plan):
             call.steps = as_refined(call, plan.steps)
-            return
+            return True
+    return False
 
 
-def cheaper(call: Call, level: int, work: int) -> list[Ground] | None:
-    """Return a cheaper sequence of steps of a level for a call's plan, without refinements.
+def cheaper(call: Call, level: int, work: int, routes: bool) -> list[Ground] | None:
+    """Return a cheaper sequence of steps of a level for a call's plan, without refinements; `routes` allows another order.
 
     The new steps also satisfy the preconditions that the upper levels impose on changes. There are two exceptions: the given plan
     violates these preconditions, or the level with these preconditions is too large. Return None if no cheaper sequence is found,
@@ -72,7 +81,7 @@ def cheaper(call: Call, level: int, work: int) -> list[Ground] | None:
             break
     if task is None or operators is None:
         return None
-    found = shorter(task, operators, work, call.space.deadline)
+    found = shorter(task, operators, work, call.space.deadline, routes)
     better = (task.cost_of(found), len(found)) < (task.cost_of(operators), len(operators))
     return [task.describe(operator)[:2] for operator in found] if better else None
 
