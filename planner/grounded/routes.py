@@ -142,12 +142,12 @@ class _StopOrders:
                 for when, _, _ in changes:
                     self.asked |= when
         while True:
-            new = [row for row in derived if any(self.makeable >> bit & 1 for bit in self.needs[row])]
+            new = {row for row in derived if any(self.makeable >> bit & 1 for bit in self.needs[row])}
             if not new:
                 return
-            for row in new:
+            for row in sorted(new):
                 self._add(row, adds[row], 0.0)
-            derived = [row for row in derived if row not in set(new)]
+            derived = [row for row in derived if row not in new]
 
     def _add(self, row: int, bits: Iterable[int], cost: float) -> None:
         for bit in bits:
