@@ -292,6 +292,7 @@ class _SoftGoalChoices:
         As long as some steps for an unmet soft goal cost less than its weight, they extend the plan of the outcome. `least` is a
         lower bound on the total cost of any choice.
         """
+        first = outcome
         longer: Outcome | None = outcome
         while longer is not None:
             outcome, longer, more = longer, None, dict[Symbol, Fraction | None]()
@@ -310,7 +311,8 @@ class _SoftGoalChoices:
         for symbol, extra in more.items():
             fact = Fact(symbol, self.problem.goal[symbol])
             wanted = conditions_of_goal(self.problem.domain, symbol)
-            known = [one for one in (extra, self.more(chosen, symbol)) if one is not None]
+            searched = self.more(chosen, symbol) if outcome is first else None  # an extended plan has other unmet goals
+            known = [one for one in (extra, searched) if one is not None]
             price = min(known).limit_denominator(PRECISION) if known else None
             forgone.append(Forgone(fact, self.weights[symbol], price, wanted))
         bound = None if least is None else float(min(least - self.unmet(kept), cost))

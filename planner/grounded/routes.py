@@ -216,6 +216,8 @@ class _StopOrders:
             steps.append(way)
             states.append(state)
             costs.append(cost)
+        if (state & task.goal) != task.goal:  # known connecting steps don't tell all derived facts apart
+            return None
         return _PlannedRoute(stops, steps, states, costs)
 
     def fitting(self, state: int, stop: int) -> int:
@@ -232,12 +234,15 @@ class _StopOrders:
             return None
         if self.arrived(state, wanted, stop):
             return []
+        checked = task.amounts is not None or bool(
+            task.derived.parts
+        )  # the bits that are told apart don't determine all others
         number = -1 if stop is None else stop
         seen = state & (self.asked | wanted) & (1 << task.size) - 1
         found = self.known.get((seen, number))
-        if found is not None and (task.amounts is None or self.leads(state, found, wanted, stop)):
+        if found is not None and (not checked or self.leads(state, found, wanted, stop)):
             return found
-        exactly = (seen if task.amounts is None else seen | state >> task.size << task.size, number)
+        exactly = (state if checked else seen, number)
         if exactly not in self.known:
             found = self.known[exactly] = self.searched(state, wanted, stop)
             if found is not None:

@@ -48,11 +48,12 @@ FLAT_ROWS = 30_000
 """Maximum number of rows of a join when a task of one level is grounded as a whole."""
 VAST = 1_000_000
 """Number of quantified behaviours of a task of one level above which the task is first searched without grounding."""
-TRIALS = 1_000_000
-"""Maximum number of trials if a level can't be grounded (about ten seconds); a trial tests one behaviour in one state."""
+TRIALS = 400_000
+"""Maximum number of trials if a level can't be grounded (about four seconds); a trial tests one behaviour in one state."""
+FIRST = 8
+"""Divisor of `TRIALS` for a task of one level before planning goal by goal."""
 BRIEFLY = 16
-"""The divisor of the effort so far with which the lowest level is searched as a whole during a restart, and the divisor of `TRIALS`
-for a task of one level before planning goal by goal."""
+"""The lowest level is searched as a whole, during a restart, with the effort so far divided by this number."""
 NOT_LEFT = "levels must not be left"
 SEARCHING, SHORTENING = 0.93, 0.85
 """Shares of the time limit after which the search ends, and after which a plan isn't shortened any more.
@@ -117,7 +118,7 @@ def _plan(
 ) -> Outcome:
     deadline, until = limits.end(SEARCHING), limits.end(SHORTENING)
     one_level = improve > 0 and len(problem.domain.levels) == 1
-    vast = one_level and quantified(problem, problem.domain.levels[0]) > VAST
+    vast = one_level and is_vast(problem)
     flat = None
     if one_level and not vast and advised is alone and first is None:
         flat = flat_first(problem, limits, deadline)  # saves compiling thousands of conditional effects
@@ -138,7 +139,7 @@ def _plan(
             return call.outcome(Status.GAVE_UP, reason=Reason("a quick search found no steps that extend the plan"))
         done = resumed or (one_level and by_rules_alone(call))
         if one_level and not done:
-            done = vast and without_grounding(call, TRIALS // BRIEFLY).plan is not None
+            done = vast and without_grounding(call, TRIALS // FIRST).plan is not None
         if one_level and not done:
             flat = flat or flat_first(problem, limits, deadline)
             call.count(flat)
@@ -147,7 +148,7 @@ def _plan(
             if flat.plan is not None:
                 call.steps, call.bound, done = as_refined(call, flat.plan.steps), flat.bound, True
             elif not vast:
-                done = without_grounding(call, TRIALS // BRIEFLY).plan is not None
+                done = without_grounding(call, TRIALS // FIRST).plan is not None
         if done or agenda.achieve_all():
             call.space.most_work, call.space.deadline = math.inf, before_the_check(call, until)
             plan = shortened(call, improve, leave_levels, advised) if improve else call.tree()
@@ -215,11 +216,19 @@ def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool) -> Outcome:
     return call.outcome(flat.status, plan, flat.reason)
 
 
+def is_vast(problem: Problem) -> bool:
+    """Return whether a task of one level has too many quantified behaviours to be grounded first."""
+    from confab.planner.hierarchical.ungrounded import joinable
+
+    (level,) = problem.domain.levels
+    return quantified(problem, level) > VAST and joinable(problem, level)
+
+
 def without_grounding(call: Call, trials: int, why: str = "") -> Outcome:
     """Search the lowest level without grounding; `why` is the reason of the outcome if the search finds no plan."""
-    from confab.planner.hierarchical.ungrounded import UngroundedSearch
+    from confab.planner.hierarchical.ungrounded import UngroundedSearch, joinable
 
-    steps = UngroundedSearch(call, trials).plan()
+    steps = UngroundedSearch(call, trials).plan() if joinable(call.problem, call.program.levels[-1]) else None
     if steps is None:
         return Outcome(Status.GAVE_UP, reason=Reason(why))
     call.steps = steps

@@ -83,7 +83,9 @@ def grouped(views: _Views) -> list[Step]:
         while span < 2 * len(points) and any(run not in groups for run in division):
             ungrouped = {begin for begin, end in division if (begin, end) not in groups}
             for run in zip(points, (*points[span:], *points[-1:] * span), strict=False):
-                if run in groups or run in refuted or not views.below(run) or ungrouped.isdisjoint(range(*run)):
+                if work <= 0 or run in groups or run in refuted:
+                    continue
+                if not views.below(run) or ungrouped.isdisjoint(range(*run)):
                     continue
                 most = min(work, BRIEFLY * len(candidates(views, run)) ** 2) if briefly else work
                 found, left = joint_steps(views, run, most)

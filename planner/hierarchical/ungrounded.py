@@ -17,7 +17,7 @@ from __future__ import annotations
 import heapq
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import reduce
+from functools import partial, reduce
 from itertools import islice, product
 from math import prod
 from operator import xor
@@ -30,12 +30,23 @@ from confab.planner.hierarchical.refinement import RefinedStep
 from confab.planner.plan import Counts
 from confab.planner.transitions import Cell, Change, Table
 from confab.reasoner.language import is_variable, mentions, needs
-from confab.reasoner.symbols import AnyOf, Behavior, Condition, EqualityCondition, RelationCondition, ValueCondition
+from confab.reasoner.limits import check
+from confab.reasoner.symbols import (
+    AnyOf,
+    Behavior,
+    Condition,
+    EqualityCondition,
+    Problem,
+    RelationCondition,
+    ValueCondition,
+)
 
 TRIAL = 10
 """The work of a trial in the unit of the budget."""
 MOST_FORCED = 1_000
 """Maximum number of states in a row that aren't ranked, since they have only one successor."""
+MOST_LOOPS = 15
+"""Maximum number of terms of a behaviour; Python nests at most 20 loops."""
 MOST_COMBINED = 16
 """Maximum number of combinations of alternatives of a behaviour that are joined separately."""
 Join: TypeAlias = "Callable[[], Iterator[tuple[str, ...]]]"
@@ -65,12 +76,13 @@ class UngroundedState:
 class UngroundedSearch:
     """The search of the lowest level from the initial state of a call.
 
-    `trials` counts the arguments that were tried for behaviours; at most `most` are tried. States with the same hash count as the
-    same state.
+    `trials` counts the arguments that were tried for behaviours; at most `most` are tried, and fewer if the budget of the call is
+    smaller. States with the same hash count as the same state.
     """
 
     def __init__(self, call: Call, most: int) -> None:
-        self.call, self.table, self.space, self.most = call, call.table, call.space, most
+        self.call, self.table, self.space = call, call.table, call.space
+        self.most = min(most, (self.space.most_work - self.space.worked) / TRIAL)
         self.level = call.program.levels[-1]
         self.trials, self.counts = 0, Counts()
         self.joins = joins(call.program, self.level, self.table)
@@ -80,8 +92,14 @@ class UngroundedSearch:
 
     def plan(self) -> list[RefinedStep] | None:
         """Return steps that achieve the goals and leave the changed symbols at rest, or None if the search finds none."""
-        end, moves = self._end(), list[GroundMove]()
-        self.space.spend(self.level, self.counts, TRIAL * self.trials)
+        moves = list[GroundMove]()
+        try:
+            end = self._end()
+        finally:
+            self.call.replace_steps(self.call.steps)
+            self.space.counts[self.level].add(self.counts)
+            self.space.expanded += self.counts.expanded
+            self.space.worked += TRIAL * self.trials
         while end is not None:
             moves[:0] = end.moves
             end = end.before
@@ -91,14 +109,15 @@ class UngroundedSearch:
         """Return a state that ends a plan, or None."""
         self.table.undo(0)
         self._push(UngroundedState(self._unmet()))
-        while self.open and self.trials < self.most:
+        while self.open and not self._over():
             unmet, _, _, state, successors = heapq.heappop(self.open)
-            self.space.check_time()
             self._return_to(state)
             if successors is None:
                 self.counts.expanded += 1
                 successors = iter(list(self._moves()))
             for move in successors:
+                if self._over():
+                    break
                 mark = len(self.table.trail)
                 after = self._after(state, move)
                 if after is not None:
@@ -139,9 +158,16 @@ class UngroundedSearch:
                     continue
                 tried.add(arguments)
                 self.trials += 1
+                if self.trials > self.most:
+                    return
                 found = forward[name](*arguments)
                 if found is not None and any(now[s].get(key) != value for s, key, value in found[1]):
                     yield GroundMove(name, arguments, *found)
+
+    def _over(self) -> bool:
+        """Return whether a limit is reached; raise `LimitError` when the time limit has passed."""
+        self.space.check_time()
+        return self.trials >= self.most or self.space.expanded + self.counts.expanded >= self.space.most
 
     def _unmet(self) -> int:
         return sum(not self.call.met(cell) for cell in self.call.goal)
@@ -178,6 +204,11 @@ class UngroundedSearch:
 
 
 # ----------------------------------------------------------------------------------------------------------------- joins
+
+
+def joinable(problem: Problem, level: int) -> bool:
+    """Return whether Python can nest the loops over the terms of each behaviour of a level."""
+    return all(len(behavior.kinds) <= MOST_LOOPS for behavior in problem.domain.at_level(level))
 
 
 def joins(program: Program, level: int, table: Table) -> Mapping[str, Join]:
@@ -229,6 +260,8 @@ def _joined(
             block.add(f"yield {tuple_written(map(written, parameters))}")
             return block.lines
         loop, terms = _loop(program, behavior, waiting, bound, sizes)
+        if bound:
+            block.add(f"{writer.constant(('look', 'time'), partial(check, 'searching'))}()")
         block.open(loop)
         tests = [f"{written(term)} == {source}" for term, source in terms if term in bound or not is_variable(term)]
         fresh = {term: source for term, source in reversed(terms) if is_variable(term) and term not in bound}

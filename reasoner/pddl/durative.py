@@ -59,8 +59,9 @@ def _bounds(form: Form) -> Iterator[Form]:
     if not parts:
         yield form
     for part in parts:
-        if isinstance(part, Form):
-            yield from _bounds(part)
+        if not isinstance(part, Form):
+            raise NotTimedError(form, f"wanted bounds of ?duration, got '{part.text}'")
+        yield from _bounds(part)
 
 
 def timed(form: Form | None, what: str, duration: PddlWord | Form) -> Iterator[tuple[str, Form]]:

@@ -21,7 +21,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from itertools import chain, combinations
+from itertools import chain, combinations, islice
 
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, bounds, situations_in, terms_of
 from confab.reasoner.amounts import inside as parts
@@ -69,6 +69,12 @@ from confab.reasoner.symbols import (
 Terms = Mapping[str, PddlTerm]
 CASES = 4
 """A conditional effect on a symbol is split into one action per value only if the symbol has at most this many other values."""
+MOST_CASES = 64
+"""Maximum number of actions into which a behaviour is split by the individuals that several effects on amounts may concern."""
+APART = (
+    "the effects may concern the same individual, and PDDL can't limit their sum; state by inequality conditions which individuals "
+    "are different to export the behaviour"
+)
 
 
 @dataclass(frozen=True)
@@ -226,7 +232,10 @@ class Lowering:
                         return
                 case _:
                     continue
-        yield from self.added(behavior)
+        every = list(islice(self.added(behavior), MOST_CASES + 1))
+        if len(every) > MOST_CASES:
+            raise KnowledgeError(f"{behavior.name} changes one amount by several effects; {APART}")
+        yield from every
 
     def added(self, behavior: Behavior) -> Iterator[Behavior]:
         """Yield behaviours, each of which states for each two effects on bounded amounts whether both change the same amount.
@@ -245,10 +254,7 @@ class Lowering:
             whens = [effect.when for effect in (one, other) if effect.when] if one.when != other.when else []
             conditions = [c for when in whens for c in when]
             if not bound.issuperset(t for t in chain(*differ, *map(mentions, conditions)) if is_variable(t)):
-                raise KnowledgeError(
-                    f"{behavior.name} changes {one.situation} by two effects that may concern the same individual, and PDDL "
-                    "can't limit their sum; write an effect for each individual to export the behaviour"
-                )
+                raise KnowledgeError(f"{behavior.name} changes {one.situation} by several effects; {APART}")
             if differ:
                 term, known = differ[0] if is_variable(differ[0][0]) else differ[0][::-1]
                 equal = EqualityCondition(term, known)

@@ -626,12 +626,22 @@ def _formed(at: Form, head: str, *items: PddlWord | Form) -> Form:
 
 def _timeless(form: Form) -> Form | None:
     """Return a metric without its terms in ``(total-time)``, or None if nothing is left."""
+    if not form.items:
+        return form
     parts = [_timeless(item) if isinstance(item, Form) else item for item in form.items[1:]]
     left = [part for part in parts if part is not None]
-    if form.head == "total-time" or (len(left) < len(parts) and (form.head != "+" or not left)):
+    costs = [part for part in left if isinstance(part, Form) or not part.text[:1].isdigit()]
+    if form.head == "total-time" or (len(left) < len(parts) and not costs):
         return None
+    if len(left) == len(parts):
+        return replace(form, items=(form.items[0], *left))
+    if form.head != "+":
+        raise PddlError("the metric combines (total-time) with a cost; (total-time) may only be added to a cost")
+    (first, *others) = costs
     return (
-        left[0]
-        if len(left) == 1 < len(parts) and isinstance(left[0], Form)
-        else replace(form, items=(form.items[0], *left))
+        replace(form, items=(form.items[0], *left))
+        if others
+        else first
+        if isinstance(first, Form)
+        else _formed(form, first.text)
     )

@@ -1,12 +1,15 @@
 """Plans whose steps share rounds: other orders of all steps, with other steps between them."""
 
-from itertools import permutations
+from itertools import pairwise, permutations
 from pathlib import Path
 
 import pytest
 
 import confab
+from confab.planner.solve import Request, solve
 from confab.planner.validation import validate
+from confab.reasoner.pddl.importing import imported
+from confab.reasoner.pddl.syntax import parse
 
 GARDEN = """@prefix : <https://example.org/garden#> .
 @prefix c: <https://w3id.org/confab/core#> .
@@ -98,3 +101,30 @@ def test_a_long_round_is_the_joint_refinement_of_all_steps_of_level_1(tmp_path: 
 @pytest.mark.parametrize(("scene", "most"), [("library-large", 36), ("canteen-large", 40), ("carts-large", 320)])
 def test_a_vehicle_serves_several_objects_in_one_round(scene: str, most: int) -> None:
     assert confab.load(scene).plan().cost <= most
+
+
+ROUND = """(define (domain round) (:requirements :strips :typing :derived-predicates :disjunctive-preconditions)
+ (:types place)
+ (:predicates (at ?p - place) (next ?p ?q - place) (one) (two) (three) (four) (lit) (open) (free) (way)
+              (first ?p - place) (second ?p - place) (third ?p - place) (fourth ?p - place) (gate ?p - place))
+ (:derived (way) (or (and (lit) (open)) (free)))
+ (:action go :parameters (?p ?q - place) :precondition (and (at ?p) (next ?p ?q)) :effect (and (not (at ?p)) (at ?q)))
+ (:action do1 :parameters (?p - place) :precondition (and (at ?p) (first ?p)) :effect (and (one) (open)))
+ (:action do2 :parameters (?p - place) :precondition (and (at ?p) (second ?p)) :effect (and (two) (not (open))))
+ (:action do3 :parameters (?p - place) :precondition (and (at ?p) (third ?p)) :effect (three))
+ (:action do4 :parameters (?p - place) :precondition (and (at ?p) (fourth ?p)) :effect (four))
+ (:action light :parameters () :precondition () :effect (lit))
+ (:action unlock :parameters (?p - place) :precondition (and (at ?p) (gate ?p)) :effect (free)))"""
+
+
+def test_known_connecting_steps_do_not_take_the_place_of_a_derived_goal() -> None:
+    """The order that is cheapest for the other goals makes the derived goal false again."""
+    places = [f"p{i}" for i in range(31)]
+    ways = " ".join(f"(next {p} {q}) (next {q} {p})" for p, q in pairwise(places))
+    text = f"""(define (problem p) (:domain round) (:objects {" ".join(places)} - place)
+      (:init (at p0) {ways} (first p5) (second p10) (third p15) (fourth p20) (gate p30))
+      (:goal (and (one) (two) (three) (four) (way))))"""
+    problem = imported(parse(ROUND, text)).problem
+    outcome = solve(Request(problem))
+    assert outcome.plan is not None
+    assert not validate(problem, outcome.plan)

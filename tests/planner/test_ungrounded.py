@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
+from time import perf_counter
 
 import pytest
 
+from confab.planner.hierarchical import planner
 from confab.planner.hierarchical.call import Call, compiled
 from confab.planner.hierarchical.ungrounded import UngroundedSearch
 from confab.planner.solve import Request, solve
 from confab.planner.validation import validate
+from confab.reasoner.limits import LimitError
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse
 from confab.reasoner.symbols import Problem
@@ -88,3 +91,67 @@ def test_the_search_without_grounding_finds_a_plan_exactly_if_there_is_one(tmp_p
             assert not validate(problem, call.tree()), seed
         judged += 1
     assert judged > 20
+
+
+MIXING = """(define (domain mixing) (:requirements :strips :typing) (:types thing)
+ (:predicates (first ?a - thing) (second ?a - thing) (third ?a - thing) (right ?a ?b ?c - thing) (mixed ?a ?b ?c - thing) (done))
+ (:action step1 :parameters (?x ?y - thing) :precondition (first ?x) :effect (and (not (first ?x)) (first ?y)))
+ (:action step2 :parameters (?x ?y - thing) :precondition (second ?x) :effect (and (not (second ?x)) (second ?y)))
+ (:action step3 :parameters (?x ?y - thing) :precondition (third ?x) :effect (and (not (third ?x)) (third ?y)))
+ (:action mix :parameters (?x ?y ?z - thing) :precondition (and (first ?x) (second ?y) (third ?z)) :effect (mixed ?x ?y ?z))
+ (:action end :parameters (?x ?y ?z - thing) :precondition (and (first ?x) (second ?y) (third ?z) (right ?x ?y ?z))
+   :effect (done)))"""
+
+
+def mixing(number: int) -> Problem:
+    """Return a task in which only one of many mixtures is right."""
+    things = [f"t{i}" for i in range(number)]
+    return imported(
+        parse(
+            MIXING,
+            f"""(define (problem p) (:domain mixing) (:objects {" ".join(things)} - thing)
+      (:init (first t0) (second t0) (third t0) (right {things[-1]} {things[-2]} {things[-3]})) (:goal (done)))""",
+        )
+    ).problem
+
+
+def test_planning_goes_on_from_the_initial_state_after_a_search_that_found_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    problem = mixing(105)  # more than a million quantified behaviours
+    monkeypatch.setattr(planner, "TRIALS", 4_000)
+    outcome = solve(Request(problem))
+    assert outcome.plan is not None
+    assert not validate(problem, outcome.plan)
+
+
+def test_the_search_keeps_its_limits_within_one_state() -> None:
+    """A single state has a million successors."""
+    call = Call(mixing(100), compiled(mixing(100)), None, 100_000)
+    search = UngroundedSearch(call, 5_000)
+    assert search.plan() is None
+    assert search.trials <= 5_001
+    assert not call.table.since(0)
+    call = Call(call.problem, call.using, perf_counter(), 100_000)
+    with pytest.raises(LimitError, match="time limit"):
+        UngroundedSearch(call, 10**9).plan()
+
+
+def test_a_plan_that_is_found_counts_against_the_budget_and_is_kept() -> None:
+    call = Call(train(3, 5), compiled(train(3, 5)), None, 10_000)
+    steps = UngroundedSearch(call, 10**6).plan()
+    assert steps is not None and call.space.worked > 0 and call.space.expanded > 0
+    call = Call(call.problem, call.using, None, 5)
+    assert UngroundedSearch(call, 10**6).plan() is None and call.space.expanded <= 5
+
+
+def test_a_behaviour_with_many_parameters_is_planned() -> None:
+    """Python can't nest a loop for each of them."""
+    many = [f"?x{i}" for i in range(24)]
+    domain = f"""(define (domain many) (:requirements :strips) (:predicates (p ?a ?b) (done))
+      (:action do :parameters ({" ".join(many)}) :precondition (and {" ".join(f"(p {a} {b})" for a, b in pairwise(many))})
+        :effect (done)))"""
+    text = "(define (problem p) (:domain many) (:objects a b c) (:init (p a b) (p b a)) (:goal (done)))"
+    problem = imported(parse(domain, text)).problem
+    outcome = solve(Request(problem))
+    assert outcome.plan is not None and len(outcome.plan.primitives) == 1

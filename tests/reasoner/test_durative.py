@@ -133,6 +133,9 @@ def test_a_metric_may_weigh_the_makespan_beside_a_cost() -> None:
         found = imported(parse(domain, problem.format(metric)))
         assert found.problem.domain.behaviors["GO"].cost == cost
         assert planned(found).makespan == 2
+    for metric in ("()", "(- (fuel) (total-time))", "(* (fuel) (total-time))"):
+        with pytest.raises(PddlError):
+            parse(domain, problem.format(metric))
 
 
 def test_a_duration_is_calculated_and_a_timed_initial_fact_is_awaited() -> None:
