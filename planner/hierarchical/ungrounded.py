@@ -43,6 +43,8 @@ from confab.reasoner.symbols import (
 
 TRIAL = 10
 """The work of a trial in the unit of the budget."""
+STATES_OF_A_TRIAL = 10
+"""Number of states of a path whose changes are applied in the time of one trial."""
 MOST_FORCED = 1_000
 """Maximum number of states in a row that aren't ranked, since they have only one successor."""
 MOST_LOOPS = 15
@@ -86,6 +88,8 @@ class UngroundedSearch:
         self.level = call.program.levels[-1]
         self.trials, self.counts = 0, Counts()
         self.joins = joins(call.program, self.level, self.table)
+        situations = call.problem.domain.situations.values()
+        self.amounts = {situation.name for situation in situations if situation.quantity is not None}
         self.facts: dict[tuple[int, Cell], set[str]] = {}
         self.seen: set[int] = set()
         self.open: list[tuple[int, bool, int, UngroundedState, Iterator[GroundMove] | None]] = []
@@ -178,7 +182,7 @@ class UngroundedSearch:
         return all(changed.isdisjoint(self.call.restless(level)) for level in self.call.program.levels[1:])
 
     def _return_to(self, state: UngroundedState) -> None:
-        """Make a state the current state of the table."""
+        """Make a state the current state of the table; a long path to the state counts as trials."""
         self.table.undo(0)
         path: list[Mapping[Cell, str]] = []
         one: UngroundedState | None = state
@@ -187,6 +191,7 @@ class UngroundedSearch:
             one = one.before
         for changes in reversed(path):
             self.table.put_all(changes)
+        self.trials += len(path) // STATES_OF_A_TRIAL
 
     def _push(
         self,
@@ -194,9 +199,14 @@ class UngroundedSearch:
         facts: Mapping[Cell, str] | None = None,
         successors: Iterator[GroundMove] | None = None,
     ) -> None:
-        """Put a state into the open list; it is novel if one of the facts is new among states with as many unmet goals."""
+        """Put a state into the open list.
+
+        The state is novel if one of the facts, except amounts, is new among states with as many unmet goals.
+        """
         novel = not facts
         for cell, value in (facts or {}).items():
+            if cell[0] in self.amounts:
+                continue
             values = self.facts.setdefault((state.unmet, cell), set())
             novel = novel or value not in values
             values.add(value)
