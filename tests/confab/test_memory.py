@@ -197,7 +197,7 @@ def test_a_memory_of_a_world_is_saved_and_read_again(name: str, tmp_path: Path) 
 
 def test_an_episode_with_an_intervention_teaches_the_steps_that_were_executed_as_planned(tmp_path: Path) -> None:
     library, memory, saved = confab.load("library-small"), tmp_path / "new.ttl", tmp_path / "episode.json"
-    disturbed = ["execute", "library-small", "--intervene", "after=0.5 atlas BOOK_AT desk", "-o", str(saved)]
+    disturbed = ["execute", "library-small", "--intervene", "after=0.7 atlas BOOK_AT desk", "-o", str(saved)]
     assert CliRunner().invoke(app, [*disturbed, "--memory", str(memory), "--learn"]).exit_code == 0
 
     def expansions(result: confab.Result) -> int:

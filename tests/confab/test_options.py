@@ -83,7 +83,7 @@ def test_the_command_of_a_page_repeats_the_call_in_the_changed_scene(tmp_path: P
 
 
 def test_the_mode_and_the_option_of_the_optimal_search_are_one(scene: confab.Scene) -> None:
-    assert scene.plan(mode="optimal", time_limit=1.0).outcome.bound is not None
+    assert scene.plan(mode="optimal", time_limit=3.0).outcome.bound is not None
 
 
 def test_a_plan_that_the_checker_rejects_never_leaves_the_command_line(

@@ -98,8 +98,8 @@ def test_a_plan_of_few_steps_is_shortened_by_little_work_on_a_level_of_thousands
     assert process_time() - begin < 20
 
 
-def test_a_swap_of_twenty_objects_is_planned_and_shortened_within_two_million_calls(tmp_path: Path) -> None:
-    """The calls of Python functions stand for CPU time; without a count of all work of the windows, there were 2.4 million."""
+def test_a_swap_of_twenty_objects_is_planned_and_shortened_within_three_million_calls(tmp_path: Path) -> None:
+    """The calls of Python functions stand for CPU time; a part of them varies the order of all steps."""
     path = tmp_path / "swap.ttl"
     write_scene(path, "swap", 20)
     problem = confab.load(path).problem
@@ -117,4 +117,4 @@ def test_a_swap_of_twenty_objects_is_planned_and_shortened_within_two_million_ca
         sys.setprofile(before)
     assert found.plan is not None
     assert len(found.plan.primitives) <= 186
-    assert calls < 2_000_000
+    assert calls < 3_000_000
