@@ -61,11 +61,8 @@ class Deadline:
 _current: ContextVar[Deadline] = ContextVar("deadline", default=Deadline())  # noqa: B039 - frozen
 
 
-NO_NUMBER = math.nan
-
-
 @contextmanager
-def within(limit: Deadline | float | None = NO_NUMBER) -> Iterator[Deadline]:
+def within(limit: Deadline | float | None) -> Iterator[Deadline]:
     """Apply a deadline, or a time limit in seconds, to a ``with`` block; provide the effective deadline.
 
     The effective deadline is the earlier of the given deadline and the current deadline.
@@ -77,8 +74,7 @@ def within(limit: Deadline | float | None = NO_NUMBER) -> Iterator[Deadline]:
     60.0
     """
     if isinstance(limit, str) or limit != limit:  # NaN would be no limit
-        given = "" if limit is NO_NUMBER else repr(limit)
-        raise TypeError(f"within({given}): wanted seconds as a number, e.g. 5, or None for no limit")
+        raise TypeError(f"within({limit!r}): wanted seconds as a number, e.g. 5, or None for no limit")
     new = limit if isinstance(limit, Deadline) else Deadline.after(limit)
     earliest = min(_current.get(), new, key=lambda one: one.at)
     token = _current.set(earliest)

@@ -44,12 +44,11 @@ DATA |= {CORE + name for name in ("duration", "by", "happensAt", "availableFrom"
 """Core properties whose values are literals; the values of all other core properties are nodes."""
 OF_ONTOLOGIES = frozenset({CORE + "symbolicOnly", CORE + "inputsHash"})
 NOT_OF_AMOUNTS = {
-    CORE
-    + "restValue": "only situation types whose values are individuals have rest values; name an individual, or, for an "
-    "amount, drop c:restValue; c:defaultAmount states the amount of each object for which the scene states none",
-    CORE + "defaultValue": "only individuals are default values; write c:defaultAmount for a number",
-}
-"""Properties of situation types that amounts don't have, each with a reason and the remedy."""
+    CORE + "restValue": "drop c:restValue, since an amount keeps the number that the last step gave it; "
+    "c:defaultAmount states the amount of each object for which the scene states none",
+    CORE + "defaultValue": "write c:defaultAmount with a number instead of c:defaultValue",
+}  # fmt: skip
+"""Properties of situation types that amounts don't have, each with the remedy."""
 HIGHEST_LEVEL = 1_000
 HIGHEST_COST = 10**9
 HIGHEST_NUMBER = 10**9
@@ -161,7 +160,7 @@ def link(row: Sequence[Term], blank: bool = False) -> Triple:
         what = f"the text '{text(value)[:60]}'" if isinstance(value, ox.Literal) else "a node without a name"
         said, number = f"<{text(subject)}>: {local_name(text(predicate))}", NOT_OF_AMOUNTS.get(text(predicate))
         if number and isinstance(value, ox.Literal) and exact(text(value)) is not None:
-            raise KnowledgeError(f"{said} is the number {text(value)}; {number}")
+            raise KnowledgeError(f"{said} is the number {text(value)}; name an individual, or, for an amount, {number}")
         raise KnowledgeError(
             f"{said} has {what} as its value; name an individual instead"
             + (", without quotation marks" if isinstance(value, ox.Literal) else "")

@@ -114,12 +114,12 @@ def numbers_missing(case: ReadCase) -> Iterator[Fault]:
             for one in individuals - stated:
                 lacking[relation, kind][one].add(behavior.name)
     for (relation, kind), found in sorted(lacking.items()):
-        who = sorted(found)
-        some = some_of(who, 5)
+        objects = sorted(found)
+        some = some_of(objects, 5)
         readers = " and ".join(sorted(set().union(*found.values())))
-        has = "have" if len(who) > 1 else "has"
+        has = "have" if len(objects) > 1 else "has"
         yield (
-            names.iri(who[0]),
+            names.iri(objects[0]),
             f"{some} {has} no {relation}, but {readers} read{'' if ' and ' in readers else 's'} {relation} of every {kind}",
             "a comparison with a missing number is false, so no such behaviour is applicable to these individuals",
             f"state {relation} of {some}, or let {readers} be about another class than {kind}",

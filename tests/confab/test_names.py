@@ -500,11 +500,6 @@ def test_a_level_that_is_no_number_is_refused(level: object) -> None:
         plan.at_level(level)  # type: ignore[arg-type]
 
 
-def test_a_time_limit_of_a_block_has_to_be_given() -> None:
-    with pytest.raises(TypeError, match=r"within\(\): wanted seconds as a number"), confab.within():
-        pass
-
-
 def test_a_goal_with_alternatives_is_no_fact_for_with_goal(tmp_path: Path) -> None:
     text = (ontology.ROOT / "scenes" / "wishes-small.ttl").read_text("utf-8")
     old = 'c:Comparison ; c:weight 8.0 ; c:about :store ; c:situationType d:STOCK ; c:sign "=" ; c:amount 0.0'
