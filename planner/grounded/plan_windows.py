@@ -72,7 +72,8 @@ def shorter(
     plan : sequence of int
         Operators that lead from the task's initial state to its goal.
     work : int
-        Maximum number of examined operators; the function examines half a million to a million operators per second.
+        Maximum number of examined operators; the function examines half a million to a million operators per second. Routes may
+        take more (`confab.planner.grounded.routes.LEAST_WORK`).
     deadline : float, optional
         The deadline on the clock of `time.perf_counter`.
     routes : bool

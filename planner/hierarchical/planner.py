@@ -139,7 +139,7 @@ def _plan(
             return call.outcome(Status.GAVE_UP, reason=Reason("a quick search found no steps that extend the plan"))
         done = resumed or (one_level and by_rules_alone(call))
         if one_level and not done:
-            done = vast and without_grounding(call, TRIALS // FIRST).plan is not None
+            done = vast and without_grounding(call, TRIALS // FIRST)
         if one_level and not done:
             flat = flat or flat_first(problem, limits, deadline)
             call.count(flat)
@@ -148,7 +148,7 @@ def _plan(
             if flat.plan is not None:
                 call.steps, call.bound, done = as_refined(call, flat.plan.steps), flat.bound, True
             elif not vast:
-                done = without_grounding(call, TRIALS // FIRST).plan is not None
+                done = without_grounding(call, TRIALS // FIRST)
         if done or agenda.achieve_all():
             call.space.most_work, call.space.deadline = math.inf, before_the_check(call, until)
             plan = shortened(call, improve, leave_levels, advised) if improve else call.tree()
@@ -203,10 +203,11 @@ def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool) -> Outcome:
         )
     if agenda.proofs.too_large is None:
         flat = lowest_alone(call, limits, BITS * limits.work)
+    elif without_grounding(call, TRIALS):
+        flat = Outcome(Status.SOLVED, call.tree())
     else:
-        flat = without_grounding(
-            call, TRIALS, f"planning goal by goal found no plan, and {agenda.proofs.too_large.text}"
-        )
+        why = f"planning goal by goal found no plan, and {agenda.proofs.too_large.text}"
+        flat = Outcome(Status.GAVE_UP, reason=Reason(why))
     if flat.status is Status.GAVE_UP and flat.reason is not None:
         return given_up(call, flat.reason.text)
     plans = () if flat.plan is None else regroupings(problem, flat.plan, lowest, call.using)
@@ -224,15 +225,13 @@ def is_vast(problem: Problem) -> bool:
     return quantified(problem, level) > VAST and joinable(problem, level)
 
 
-def without_grounding(call: Call, trials: int, why: str = "") -> Outcome:
-    """Search the lowest level without grounding; `why` is the reason of the outcome if the search finds no plan."""
+def without_grounding(call: Call, trials: int) -> bool:
+    """Search the lowest level without grounding; return whether the steps of the call are a plan now."""
     from confab.planner.hierarchical.ungrounded import UngroundedSearch, joinable
 
     steps = UngroundedSearch(call, trials).plan() if joinable(call.problem, call.program.levels[-1]) else None
-    if steps is None:
-        return Outcome(Status.GAVE_UP, reason=Reason(why))
-    call.steps = steps
-    return Outcome(Status.SOLVED, call.tree())
+    call.steps = steps or call.steps
+    return steps is not None
 
 
 def given_up(call: Call, why: str) -> Outcome:

@@ -60,8 +60,11 @@ def dominated(task: Task, ends: Ends, lasts: Sequence[int], running: int) -> set
     for operator, end in enumerate(ends):
         if end is not None and not (task.amounts and (task.amounts.made(operator) or task.amounts.made(end))):
             alike[_without(task, operator, running), _without(task, end, running)].append(operator)
-    most = {operator: max(lasts[one] for one in group) for group in alike.values() for operator in group}
-    return {operator for operator, longest in most.items() if lasts[operator] < longest}
+    found = set[int]()
+    for group in alike.values():
+        longest = max(lasts[one] for one in group)
+        found.update(one for one in group if lasts[one] < longest)
+    return found
 
 
 def excluding(task: Task, never: Set[int], running: int) -> Task:
