@@ -13,10 +13,10 @@ Haslum, Thiébaux and Ramirez, "Subgoaling techniques for satisficing and optima
 
 from __future__ import annotations
 
-import heapq
 import math
 from collections import defaultdict
 from collections.abc import Callable, Sequence
+from heapq import heappop, heappush
 from typing import NamedTuple, TypeAlias
 
 from confab.planner.grounded.amounts import AmountVector, Exact, Linear, pushes
@@ -144,6 +144,7 @@ def cost_left(task: Task) -> Callable[[int], float]:
     masks = [sum(1 << bit for bit in bits) for bits in needs]
     needed_by = _needed_by(needs, task.size)
     low, goal = (1 << task.size) - 1, bits_of(task.goal)
+    prices: dict[AmountVector, list[float]] = {}
 
     def priced(vector: AmountVector) -> list[float]:
         """Return the cost of each operator with its repetitions.
@@ -158,7 +159,10 @@ def cost_left(task: Task) -> Callable[[int], float]:
         return price
 
     def left(state: int) -> float:
-        price = priced(task.amounts.vector(state)) if task.amounts is not None else costs
+        price = costs
+        if task.amounts is not None:
+            vector = task.amounts.vector(state)
+            price = prices.get(vector) or prices.setdefault(vector, priced(vector))
         absent = low & ~state
         open_ = [(mask & absent).bit_count() for mask in masks]
         reached, supporter = [math.inf] * task.size, [-1] * task.size
@@ -166,25 +170,26 @@ def cost_left(task: Task) -> Callable[[int], float]:
             reached[bit] = 0.0
         queue: list[tuple[float, int]] = []
         wanted = {bit for bit in goal if reached[bit]}
-
-        def reach(o: int, total: float) -> None:
-            for bit in adds[o]:
-                if total < reached[bit]:
-                    reached[bit], supporter[bit] = total, o
-                    heapq.heappush(queue, (total, bit))
-
-        for o, number in enumerate(open_):
-            if not number:
-                reach(o, price[o])
-        while queue and wanted:
-            cost, bit = heapq.heappop(queue)
-            if cost > reached[bit]:
-                continue
-            wanted.discard(bit)
-            for o in needed_by[bit]:
-                open_[o] -= 1
-                if not open_[o]:
-                    reach(o, price[o] + sum([reached[need] for need in needs[o]]))
+        ready = [o for o, number in enumerate(open_) if not number]
+        while True:
+            for o in ready:
+                total = price[o]
+                for need in needs[o]:
+                    total += reached[need]
+                for bit in adds[o]:
+                    if total < reached[bit]:
+                        reached[bit], supporter[bit] = total, o
+                        heappush(queue, (total, bit))
+            if not queue or not wanted:
+                break
+            cost, bit = heappop(queue)
+            ready = []
+            if cost <= reached[bit]:
+                wanted.discard(bit)
+                for o in needed_by[bit]:
+                    open_[o] -= 1
+                    if not open_[o]:
+                        ready.append(o)
         if wanted:
             return math.inf
         chosen: dict[int, float] = {}

@@ -18,7 +18,7 @@ from confab.reasoner.language import DomainError, walk
 from confab.reasoner.limits import checked
 from confab.reasoner.names import Names, local_name
 from confab.reasoner.reading import swrl
-from confab.reasoner.reading.definitions import Definitions
+from confab.reasoner.reading.definitions import THING, Definitions
 from confab.reasoner.reading.facts import individuals_named
 from confab.reasoner.reading.parts import Parts
 from confab.reasoner.reading.remembering import Past, iris_of_the_past, past, remembers_in_order
@@ -340,7 +340,7 @@ def _definitions(schema: OntologySchema, names: Names) -> Definitions:
         kinds[prop] = "|".join(map(names.short, owners[situation])), names.short(situation)
     for iri in schema.of_kind("Relation", "ReachRelation"):
         ends = (schema.nodes[iri].get(RDFS + end, ()) for end in ("domain", "range"))
-        one, other = (names.short(end[0]) if len(end) == 1 and ":" in end[0] else "" for end in ends)
+        one, other = (names.short(end[0]) if len(end) == 1 and ":" in end[0] and end[0] != THING else "" for end in ends)
         kinds[iri] = one, other
     nodes = {**schema.expressions, **schema.axioms, **schema.swrl}
     found = Definitions(nodes, properties, names, schema.numbers, kinds)

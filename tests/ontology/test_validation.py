@@ -102,6 +102,27 @@ def test_a_term_can_be_any_individual_in_both_its_class_and_the_required_class(
     assert {finding.rule for finding in validate([scene])} & OUTSIDE == rules
 
 
+def test_a_domain_or_range_of_all_things_restricts_nothing(tmp_path: Path) -> None:
+    scene = skeleton(tmp_path)
+
+    def planned() -> list[tuple[str, tuple[str, ...]]]:
+        return [(step.behavior, step.arguments) for step in confab.load(scene).plan().plan.steps]
+
+    before = planned()
+    domain = tmp_path / "washing.ttl"
+    near = """
+    :near a owl:ObjectProperty, owl:NamedIndividual, c:Relation ; rdfs:domain owl:Thing ; rdfs:range owl:Thing .
+    :shelf a owl:NamedIndividual, :Place ; :near :shelf .
+    :Handy a owl:Class, owl:NamedIndividual ; rdfs:label "handy"@en ; owl:equivalentClass
+      [ a owl:Restriction ; owl:onProperty :near ; owl:someValuesFrom owl:Thing ] .
+    """
+    text, count = re.subn(r"rdfs:(domain|range) [\w:]+", r"rdfs:\1 owl:Thing", domain.read_text(encoding="utf-8"))
+    assert count
+    domain.write_text(text + near, encoding="utf-8")
+    assert {finding.rule for finding in validate([scene])} <= {"no-label", "missing-all-different"}
+    assert planned() == before
+
+
 @pytest.mark.parametrize(
     ("title", "node", "remedy"),
     [
