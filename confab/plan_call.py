@@ -28,6 +28,7 @@ from confab.plan_options import NO_ENGINE, PlanOptions
 from confab.planner.certified import certified
 from confab.planner.plan import Limits, Outcome, Reason, Shortening, Status
 from confab.planner.solve import DEFAULT_MODE, Request, solve, unchecked
+from confab.planner.timed.plan import schedule_of
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import Deadline, OutOfTimeError
 from confab.reasoner.memory.links import Links
@@ -36,10 +37,8 @@ from confab.reasoner.reading.problem import Reading
 from confab.reasoner.reading.relevance import recognise
 from confab.reasoner.refining import never_done, without
 from confab.reasoner.symbols import Behavior, GroundBehavior, Problem
-from confab.reasoner.timing import may_overlap_by_need
 from confab.timing import (
     asks_for_times,
-    concurrent,
     needs_others_meanwhile,
     scheduled,
     with_unit_costs,
@@ -162,7 +161,8 @@ def planned(task: PlanningTask) -> Found:
         if problem.weights:
             raise KnowledgeError("a task whose steps must overlap can't have soft goals; drop the :weight of its goals")
         problem = task.with_measured_durations(problem if task.reading.whole else task.whole())
-        return Found(problem, *concurrent(problem, task.deadline), None, False)
+        outcome = solve(Request(problem, limits=Limits(seconds=task.deadline.left)))
+        return Found(problem, outcome, schedule_of(outcome), None, False)
     if asks_for_times(problem, task.options.minimise):
         import_module("confab.planner.timed.call")  # the search has a share of the time that is left afterwards
     if faulty:
@@ -179,10 +179,8 @@ def planned(task: PlanningTask) -> Found:
         if outcome.plan is None:
             raise
         outcome = unchecked(outcome, error)
-    problem, timed = task.with_measured_durations(problem), None
-    if outcome.status is Status.UNSOLVABLE and may_overlap_by_need(problem):
-        outcome, timed = concurrent(problem, task.deadline)
-    elif asks_for_times(problem, task.options.minimise):
+    problem, timed = task.with_measured_durations(problem), schedule_of(outcome)
+    if timed is None and asks_for_times(problem, task.options.minimise):
         outcome, timed = in_time(task, problem, outcome)
     return Found(problem, outcome, timed, part, task.options.strategy == "optimal")
 
@@ -309,6 +307,8 @@ def search(task: PlanningTask, problem: Problem, how: Searching) -> Outcome:
     unlimited = request.limits.seconds is None and how.mode != "paper" and find_spec("unified_planning") is not None
     again = request if engines and unlimited else None
     outcome = solve(replace(request, limits=replace(request.limits, work=OURS_WORK)) if again else request)
+    if schedule_of(outcome) is not None and task.problem.weights:
+        return Outcome(Status.GAVE_UP, reason=Reason("only steps that must overlap reach these soft goals"))
     if outcome.status is not Status.GAVE_UP or not engines or deadline.left == 0:
         return outcome
     return by_installed_engine(problem, deadline, outcome, again)
@@ -332,7 +332,7 @@ def own_request(task: PlanningTask, problem: Problem, how: Searching, engines: b
         else None
     )
     return Request(
-        with_unit_costs(problem) if options.minimise == "steps" else problem,
+        task.with_measured_durations(with_unit_costs(problem) if options.minimise == "steps" else problem),
         how.mode,
         Limits(seconds=seconds, work=how.most_work if seconds is None else inf, shortening=shortening),
         None if memory is None or isinstance(memory, Links) else memory.advisor,

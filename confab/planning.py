@@ -19,6 +19,7 @@ from confab.plan_call import planned, read_task
 from confab.plan_options import PlanOptions
 from confab.planner.plan import Outcome, Plan, SoftGoal, Status, Step, paused_collection, renumbered
 from confab.planner.solve import DEFAULT_MODE, Mode, Request, solve
+from confab.planner.timed.plan import schedule_of
 from confab.planner.validation import Fault, unmet_goals, validate
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.kinds import PLAN
@@ -305,7 +306,7 @@ class Result(metaclass=RightNames):
         """The causal links of each step, by the step's path (`confab.planner.causal_links`)."""
         from confab.planner.causal_links import purposes
 
-        if needs_others_meanwhile(self.problem):
+        if schedule_of(self.outcome) is not None or needs_others_meanwhile(self.problem):
             raise KnowledgeError("steps of this plan must overlap; reasons are given for sequences of steps only")
         return purposes(self.problem, self.plan)
 
@@ -458,7 +459,7 @@ class Result(metaclass=RightNames):
         """
         from confab.planner.plan_costs import in_circles
 
-        if self.outcome.plan is None or self.outcome.proved:
+        if self.outcome.plan is None or self.outcome.proved or schedule_of(self.outcome) is not None:
             return ""
         if self.optimal:
             return "a longer time limit (--time-limit, in Python time_limit) may prove more, or find a better plan"

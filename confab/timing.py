@@ -8,7 +8,8 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from confab.formats import ScheduledStepJson, ScheduleJson
-from confab.planner.plan import Limits, Outcome, Status
+from confab.planner.plan import Outcome, Status
+from confab.planner.timed.plan import schedule_of
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import Deadline
 from confab.reasoner.symbols import Problem
@@ -52,23 +53,16 @@ def has_times(problem: Problem) -> bool:
     return durations or asks_for_times(problem, None)
 
 
-def concurrent(problem: Problem, deadline: Deadline) -> tuple[Outcome, TimedPlan | None]:
-    """Make a plan whose steps overlap in time if this is necessary; return the outcome and the schedule."""
-    from confab.planner.timed.concurrent import plan
-
-    outcome, timed = plan(problem, Limits(seconds=deadline.left))
-    return outcome, timed.plan
-
-
 def scheduled(
     problem: Problem, outcome: Outcome, deadline: Deadline, shorten: bool
 ) -> tuple[Outcome, TimedPlan | None]:
     """Schedule the plan of an outcome; the cost and the levels left are those of the scheduled plan, which may have other steps.
 
-    If no schedule meets the deadlines and windows of the task, the outcome's status becomes "gave up".
+    A plan whose steps must overlap already has a schedule. If no schedule meets the deadlines and windows of the task, the
+    outcome's status becomes "gave up".
     """
-    if outcome.plan is None:
-        return outcome, None
+    if outcome.plan is None or schedule_of(outcome) is not None:
+        return outcome, schedule_of(outcome)
     from confab.planner.levels import levels_left
     from confab.planner.plan_costs import cost_of
     from confab.planner.timed.call import best_in_time

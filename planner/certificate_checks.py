@@ -23,6 +23,7 @@ from confab.planner.checked_conditions import own_variables, unified
 from confab.planner.possibilities import Beginning, FactEvaluation, Lowest, Range, WorkLimitError
 from confab.reasoner.amounts import bounds, number, written
 from confab.reasoner.symbols import FALSE, TRUE, Behavior, Fact, Problem, Symbol
+from confab.reasoner.timing import by_events
 
 OTHER, ANY, KEPT = "", "?", "="
 """The special entries of a case.
@@ -44,7 +45,14 @@ The changed entries are None if the behaviour isn't applicable.
 
 
 def refusal(problem: Problem, certificate: Certificate, most: float = WORK) -> str | None:
-    """Return the reason why a certificate doesn't prove that a problem has no plan, or None if it is a proof."""
+    """Return the reason why a certificate doesn't prove that a problem has no plan, or None if it is a proof.
+
+    If overlapping steps may reach more goals, the behaviours are the begins and the ends of steps.
+    """
+    events = by_events(problem)
+    if events is None:
+        return "steps that overlap may reach more goals, and their begins and ends can't be examined separately"
+    problem = events
     try:
         for symbol in (*certificate.told_apart, *certificate.always, *(fact.symbol for fact in certificate.never)):
             if symbol.situation not in problem.domain.situations:

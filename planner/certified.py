@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from confab.planner.plan import Outcome, Reason, Status, UngroundableError
 from confab.reasoner.limits import OutOfTimeError, current
 from confab.reasoner.symbols import Problem
+from confab.reasoner.timing import by_events
 
 if TYPE_CHECKING:
     from confab.planner.certificates import Certificate
@@ -30,12 +31,16 @@ def certified(problem: Problem, outcome: Outcome) -> Outcome:
 
     why = ""
     examined = outcome.reason is not None and outcome.reason.states > 0
+    events = by_events(problem)
     for given in (True, False):
-        certificate = outcome.certificate if given else certify(problem, few_states=examined)
+        if events is None:
+            why = "steps that overlap may reach more goals"
+            break
+        certificate = outcome.certificate if given else certify(events, few_states=examined)
         if certificate is None:
             continue
         if (refused := refusal(problem, certificate)) is None:
-            reason = _added_up(problem, certificate) or told(problem, certificate)
+            reason = _added_up(events, certificate) or told(events, certificate)
             return replace(outcome, certificate=certificate, reason=reason)
         why = f"the checker refuses the certificate: {refused}"
     searched = outcome.reason.text if outcome.reason else "the search found no plan"

@@ -25,9 +25,11 @@ from confab.planner.certified import certified
 from confab.planner.levels import levels_left
 from confab.planner.plan import OUT_OF_MEMORY, Limits, Outcome, Reason, Status, UnsolvableError
 from confab.planner.plan_costs import cost_of
+from confab.planner.timed.plan import schedule_of
 from confab.planner.validation import validate
 from confab.reasoner.limits import Deadline, OutOfTimeError, overtime, within
 from confab.reasoner.symbols import GroundBehavior, Problem
+from confab.reasoner.timing import by_events, judged_by_events, may_overlap_by_need, only_during
 
 if TYPE_CHECKING:
     from confab.planner.experience.advice import Advisor
@@ -36,6 +38,8 @@ if TYPE_CHECKING:
 Mode: TypeAlias = Literal["guarded", "leading", "strict", "optimal", "paper"]
 """The keys of `MODES`."""
 DEFAULT_MODE: Mode = "guarded"
+IN_SEQUENCE = 0.75
+"""Share of the time limit for plans whose steps are executed one after another if overlapping steps may reach more goals."""
 
 
 class RejectedPlanError(Exception):
@@ -86,17 +90,17 @@ def solve(request: Request) -> Outcome:
     """
     if request.mode not in MODES:
         raise ValueError(f"unknown mode '{request.mode}'; wanted one of {', '.join(MODES)}")
-    deadline = Deadline.after(request.limits.seconds)
+    deadline, by_need = Deadline.after(request.limits.seconds), may_overlap_by_need(request.problem)
     try:
         with within(deadline):
-            outcome = MODES[request.mode](request)
+            outcome = _overlapping(request, deadline) if by_need else MODES[request.mode](request)
     except MemoryError:
         return Outcome(Status.GAVE_UP, reason=OUT_OF_MEMORY)
     except OutOfTimeError as error:
         return Outcome(Status.GAVE_UP, reason=Reason(str(error)))
     if outcome.status is Status.GAVE_UP and (proof := _last_proof(request.problem, deadline)):
         outcome = replace(outcome, status=Status.UNSOLVABLE, reason=proof.reason, certificate=proof.certificate)
-    if outcome.plan is None:
+    if outcome.plan is None or schedule_of(outcome) is not None:
         with within(deadline):
             return certified(request.problem, outcome)
     try:
@@ -116,6 +120,32 @@ def solve(request: Request) -> Outcome:
     if all(step.level == first for step in plan.steps):
         return outcome  # no run of lower-level steps to report
     return replace(outcome, left=tuple(levels_left(request.problem, plan)))
+
+
+def _overlapping(request: Request, deadline: Deadline) -> Outcome:
+    """Return a plan whose steps are executed one after another, or a timed plan whose steps must overlap."""
+    from confab.planner.timed.concurrent import plan
+    from confab.planner.timed.validation import validate_in_sequence
+
+    problem, first = request.problem, request.first
+    by_need = judged_by_events(problem)
+    if first is not None and schedule_of(first) is not None:
+        return Outcome(Status.GAVE_UP, reason=Reason("a plan whose steps must overlap isn't changed"))
+    outcome = Outcome(Status.GAVE_UP, reason=Reason("some steps need other steps meanwhile"))
+    if not only_during(problem):
+        seconds = None if deadline.left is None else IN_SEQUENCE * deadline.left
+        outcome = MODES[request.mode](replace(request, limits=replace(request.limits, seconds=seconds)))
+        if outcome.plan is not None and not (by_need and validate_in_sequence(problem, outcome.plan)):
+            return replace(outcome, bound=None) if by_need else outcome  # overlapping steps may cost less
+    proof = _last_proof(problem, deadline)
+    if proof is not None:
+        return replace(outcome, status=Status.UNSOLVABLE, plan=None, reason=proof.reason, certificate=proof.certificate)
+    found = plan(problem, Limits(seconds=deadline.left))[0]
+    if found.plan is not None:
+        return found
+    said = " and ".join(one.reason.text for one in (outcome, found) if one.reason is not None)
+    states = 0 if outcome.reason is None else outcome.reason.states
+    return replace(outcome, plan=None, reason=Reason(said, states=states), bound=None)
 
 
 def unchecked(outcome: Outcome, error: OutOfTimeError) -> Outcome:
@@ -167,8 +197,9 @@ def _last_proof(problem: Problem, deadline: Deadline) -> UnsolvableError | None:
 
     if deadline.left is not None and deadline.left < (1 - SEARCHING) * deadline.seconds:
         return None
+    events = by_events(problem)
     with suppress(OutOfTimeError):
-        return impossible(problem, AT_ONCE, deadline.at)
+        return None if events is None else impossible(events, AT_ONCE, deadline.at)
     return None
 
 

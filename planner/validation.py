@@ -54,17 +54,21 @@ class Fault:
 
 def validate(problem: Problem, plan: Plan) -> list[Fault]:
     """Return the faults that `carried_out` finds in a plan, and its wrong IDs; the list is empty for a valid plan."""
-    steps = [step for node in plan.walk() for step in node.together if _fits(problem, step)]
+    return carried_out(problem, plan) + wrong_ids(problem, plan)
+
+
+def wrong_ids(problem: Problem, plan: Plan) -> list[Fault]:
+    """Return a fault for each step of a plan whose ID isn't the number of its behaviour with its arguments."""
+    steps = [step for node in plan.walk() for step in node.together if fitting(problem, step)]
     numbered = [(step, problem.id_of(step.behavior, step.arguments)) for step in steps]
-    wrong = [
+    return [
         Fault(step.path, f"{step}: its ID by the numbering of level {step.level} is {number}")
         for step, number in numbered
         if number != step.id
     ]
-    return carried_out(problem, plan) + wrong
 
 
-def _fits(problem: Problem, step: Step) -> bool:
+def fitting(problem: Problem, step: Step) -> bool:
     """Return whether the behaviour of a step exists, and the arguments belong to the classes of the parameters."""
     behavior = problem.domain.behaviors.get(step.behavior)
     if behavior is None or len(behavior.parameters) != len(step.arguments):
@@ -142,7 +146,7 @@ class _PlanExecution:
         self.rules = rules
         self.facts = LoggedState(problem, problem.initial, rules)
         self.rules.remember(self.facts)
-        self.exceptions = {name: Fraction(self.facts.value(name, ()) or 0) for name in problem.domain.constraints}
+        self.exceptions = exceptions_of(problem, self.facts)
         self.faults: list[Fault] = []
 
     def fault(self, path: tuple[int, ...], text: str) -> None:
@@ -281,26 +285,41 @@ class _PlanExecution:
 
         The initial state may have exceptions to a constraint. A step violates the constraint if the number of exceptions grows.
         """
-        constraints = self.problem.domain.constraints
-        for name in self.rules.bounded:
-            kind = self.problem.domain.situations[name]
-            if level is not None and kind.level > level:
+        found = violation(self.rules, self.facts, self.exceptions, level)
+        if found is not None:
+            self.fault(step.path, f"{step}: {found}")
+        return found is None
+
+
+def exceptions_of(problem: Problem, facts: LoggedState) -> dict[str, Fraction]:
+    """Return the number of exceptions to each constraint."""
+    return {name: Fraction(facts.value(name, ()) or 0) for name in problem.domain.constraints}
+
+
+def violation(
+    rules: BehaviorReader, facts: LoggedState, exceptions: dict[str, Fraction], level: int | None = None
+) -> str | None:
+    """Return the constraint that a step has violated, or the total that it leaves out of its bounds, as text, or None.
+
+    `exceptions` contains the number of exceptions to each constraint before the step, and afterwards the number after the step.
+    """
+    domain, classes = rules.problem.domain, rules.problem.classes
+    for name in rules.bounded:
+        kind = domain.situations[name]
+        if level is not None and kind.level > level:
+            continue
+        for arguments in product(*(classes.get(of, ()) for of in kind.arguments)):
+            got = facts.value(name, arguments)
+            if got is None or kind.quantity is None:
                 continue
-            for arguments in product(*(self.problem.classes.get(of, ()) for of in kind.arguments)):
-                got = self.facts.value(name, arguments)
-                if got is None or kind.quantity is None:
-                    continue
-                if name in constraints:
-                    before, self.exceptions[name] = self.exceptions[name], Fraction(got)
-                    if Fraction(got) > before:
-                        one = constraints[name]
-                        self.fault(step.path, f"{step}: {one}, and is {'false' if one.always else 'true'} after it")
-                        return False
-                elif not kind.quantity.allows(Fraction(got)):
-                    wrong = f"it leaves {Symbol(name, arguments)} = {got}, which is out of its bounds"
-                    self.fault(step.path, f"{step}: {wrong}")
-                    return False
-        return True
+            if name in domain.constraints:
+                before, exceptions[name] = exceptions[name], Fraction(got)
+                if Fraction(got) > before:
+                    one = domain.constraints[name]
+                    return f"{one}, and is {'false' if one.always else 'true'} after it"
+            elif not kind.quantity.allows(Fraction(got)):
+                return f"it leaves {Symbol(name, arguments)} = {got}, which is out of its bounds"
+    return None
 
 
 def stretches(steps: Sequence[Step], level: int) -> Iterator[list[Step]]:

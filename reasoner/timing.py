@@ -9,14 +9,20 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 
+from confab.reasoner.amounts import situations_in
 from confab.reasoner.language import walk
 from confab.reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AmountEffect,
     Behavior,
     Condition,
     Effect,
     Problem,
+    SituationType,
     Span,
     Timing,
     ValueCondition,
@@ -94,6 +100,64 @@ def may_overlap_by_need(problem: Problem) -> bool:
         if behavior.timing is not None
         for span, _ in (*behavior.timing.conditions, *behavior.timing.effects)
     )
+
+
+def judged_by_events(problem: Problem) -> bool:
+    """Return whether the begins and ends of steps determine alone whether a timed plan is valid (docs/levels.md, "In time").
+
+    Otherwise the steps of a timed plan also have to be a valid plan if they are executed one after another.
+    """
+    return may_overlap_by_need(problem) and len(problem.domain.levels) == 1 and not problem.domain.remembers
+
+
+def by_events(problem: Problem) -> Problem | None:
+    """Return a problem in which the begin, the duration and the end of a step are separate behaviours, and which has no times.
+
+    The conditions throughout a step have to hold at some time between its begin and its end. So every timed plan of the given
+    problem gives a plan of this problem: if this problem has no plan, overlapping steps don't help either. Return the given problem
+    if no condition or effect concerns the start or end of a step. Return None if no such problem is known: plans aren't judged by
+    events alone, or an effect at the end depends on the state at the begin.
+    """
+    if not may_overlap_by_need(problem):
+        return problem
+    behaviors, situations = dict[str, Behavior](), dict(problem.domain.situations)
+    for name, one in problem.domain.behaviors.items():
+        timing, its = timing_of(one), tuple(p.name for p in one.parameters)
+        by_begin = any(
+            effect.when or (isinstance(effect, AmountEffect) and situations_in(effect.amount))
+            for effect in timing.made(Span.THROUGHOUT)
+        )
+        if not judged_by_events(problem) or by_begin or {v.name for v in one.variables}.intersection(timing.actors):
+            return None
+        held = bool(timing.asked(Span.THROUGHOUT))
+        marks = [f"{name}@{mark}" for mark in ("running", *(["held"] if held else []))]
+        for mark in marks:
+            kinds = tuple(p.kind for p in one.parameters)
+            situations[mark] = SituationType(mark, kinds, "Truth", one.level, FALSE, FALSE, boolean=True)
+        parts = [("begin", timing.asked(Span.START), timing.made(Span.START), marks[:1], FALSE)]
+        if held:
+            parts.append(("during", timing.asked(Span.THROUGHOUT), (), marks[1:], FALSE))
+        ending = (*timing.made(Span.THROUGHOUT), *timing.made(Span.END))
+        parts.append(("end", timing.asked(Span.END), ending, marks, TRUE))
+        for part, asked, made, changed, was in parts:
+            wanted = [c for c in asked if c not in (one.priced, one.lasting)]
+            wanted += [ValueCondition(mark, its, was) for mark in changed]
+            wanted += [ValueCondition(marks[0], its, TRUE)] if part == "during" else []
+            becomes = FALSE if was == TRUE else TRUE
+            behaviors[f"{name}@{part}"] = replace(
+                one,
+                name=f"{name}@{part}",
+                preconditions=tuple(dict.fromkeys(wanted)),
+                effects=(
+                    *(e for e in made if isinstance(e, ValueEffect)),
+                    *(ValueEffect(mark, its, becomes) for mark in changed),
+                ),
+                amounts=tuple(e for e in made if isinstance(e, AmountEffect)),
+                price=None,
+                timing=None,
+            )
+    domain = replace(problem.domain, situations=situations, behaviors=behaviors, first_ids={})
+    return replace(problem, domain=domain, times=None)
 
 
 def _passing(behavior: Behavior) -> tuple[ValueEffect, ...]:

@@ -23,7 +23,6 @@ from confab.reasoner.symbols import (
     TRUE,
     Aggregate,
     Behavior,
-    Constraint,
     Domain,
     Parameter,
     Problem,
@@ -282,7 +281,7 @@ def problem_of(world: TimedWorld) -> Problem:
         together = tuple(ValueCondition(f"F{fact}", ("it",), TRUE if value else FALSE) for fact, value in world.never)
         count = Aggregate("E", "count", Fraction(1), (), (Parameter("?it", "Thing"),), together)
         situations["E"] = SituationType("E", (), "E", quantity=Quantity(whole=True, most=Fraction(0)))
-        domain = compiled(replace(domain, aggregates={"E": count}, constraints={"E": Constraint("F0")}), classes)
+        domain = compiled(replace(domain, aggregates={"E": count}), classes)
         initial = with_totals(domain, classes, {}, initial)
     deadlines = {Symbol(f"F{fact}", ("it",)): Fraction(by) for fact, by in world.deadlines}
     windows = {f"actor{actor}": ((Fraction(low), Fraction(high)),) for actor, low, high in world.windows}

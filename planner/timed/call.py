@@ -31,6 +31,7 @@ from confab.planner.timed.validation import validate_timed
 from confab.planner.validation import Cell, validate
 from confab.reasoner.limits import LimitError, check, overtime, within
 from confab.reasoner.symbols import Fact, Problem, Times
+from confab.reasoner.timing import judged_by_events
 
 
 @dataclass(frozen=True)
@@ -294,9 +295,11 @@ def _slack(
 def _ordered(problem: Problem, timed: TimedPlan) -> TimedPlan | None:
     """Return a timed plan whose steps are sorted in the order of the schedule, so that they form a valid plan in sequence.
 
-    If the sorted steps aren't a valid plan, return the given timed plan if its steps are a valid plan, otherwise None.
+    If the sorted steps aren't a valid plan, return the given timed plan if its steps are a valid plan. If neither is a valid plan,
+    return the sorted plan if it exists, or the given plan if its steps needn't be valid in sequence, otherwise None.
     """
-    own = None if validate(problem, timed.plan) else timed
+    valid = not validate(problem, timed.plan)
+    own = timed if valid or judged_by_events(problem) else None
     numbers = {slot.step.path: i for i, slot in enumerate(timed.slots)}
     begins = [slot.begin for slot in timed.slots]
     after: dict[int, list[int]] = {}
@@ -329,4 +332,4 @@ def _ordered(problem: Problem, timed: TimedPlan) -> TimedPlan | None:
     place = {number: i for i, number in enumerate(old)}
     slots = tuple(replace(timed.slots[n], step=new) for n, new in zip(old, plan.primitives, strict=True))
     arcs = tuple(sorted((place[i], place[j]) for i, j in timed.arcs))
-    return replace(timed, plan=plan, slots=slots, arcs=arcs) if own is None or not validate(problem, plan) else own
+    return own if valid and validate(problem, plan) else replace(timed, plan=plan, slots=slots, arcs=arcs)

@@ -31,7 +31,8 @@ from confab.planner.timed.activities import EventKind, StepEvent
 from confab.planner.timed.call import Timed, in_time
 from confab.planner.timed.envelopes import dominated, excluding, oversized
 from confab.planner.timed.pieces import duration_of
-from confab.planner.validation import LoggedState
+from confab.planner.timed.plan import TimedOutcome
+from confab.planner.validation import Cell, LoggedState
 from confab.reasoner.language import walk
 from confab.reasoner.limits import OutOfTimeError, check, checked
 from confab.reasoner.symbols import (
@@ -49,7 +50,7 @@ from confab.reasoner.symbols import (
 )
 from confab.reasoner.timing import only_during, projected, timing_of
 
-BEGIN, END, RUNNING, HELD = "@begin", "@end", "@running", "@held"
+BEGIN, END, RUNNING, HELD, BUSY = "@begin", "@end", "@running", "@held", "@busy"
 FIRST = 0.5
 """Share of the time limit for the search without durations."""
 MOST_STATES = 300_000
@@ -101,7 +102,13 @@ def plan(problem: Problem, limits: Limits, separation: Fraction = Fraction(0)) -
                 timed = in_time(problem, steps, left, separation, events)
                 if timed.plan is not None:
                     seconds = perf_counter() - began
-                    its = Outcome(Status.SOLVED, timed.plan.plan, search={task.level: counts}, seconds=seconds)
+                    its = TimedOutcome(
+                        Status.SOLVED,
+                        timed.plan.plan,
+                        search={task.level: counts},
+                        seconds=seconds,
+                        timed=timed.plan,
+                    )
                     return its, timed
     except (UngroundableError, OutOfTimeError) as error:
         return ended(str(error))
@@ -127,9 +134,11 @@ class _Cut:
         """The problem in which begins and ends replace the split behaviours."""
         domain = self.whole.domain
         situations, behaviors = dict(domain.situations), dict[str, Behavior]()
+        situations[BUSY] = SituationType(BUSY, (BUSY,), "Truth", default=FALSE, boolean=True)
         for name, behavior in domain.behaviors.items():
             if name not in self.behaviors:
-                behaviors[name] = replace(behavior, timing=None)
+                idle = [ValueCondition(*cell, FALSE) for cell in self.busy(behavior)]
+                behaviors[name] = replace(behavior, preconditions=(*behavior.preconditions, *idle), timing=None)
                 continue
             kinds = tuple(parameter.kind for parameter in behavior.parameters)
             running = SituationType(name + RUNNING, kinds, "Truth", default=FALSE, boolean=True)
@@ -142,7 +151,17 @@ class _Cut:
                     domain.situations[name], name=name + HELD, range="Truth", rest=None, default=FALSE, boolean=True
                 )
             behaviors = {name: self.guard(behavior) for name, behavior in behaviors.items()}
-        return replace(self.whole, domain=replace(domain, situations=situations, behaviors=behaviors, first_ids={}))
+        every = dict.fromkeys(one for its in self.whole.classes.values() for one in its)
+        return replace(
+            self.whole,
+            domain=replace(domain, situations=situations, behaviors=behaviors, first_ids={}),
+            classes={**self.whole.classes, BUSY: tuple(every)},
+        )
+
+    def busy(self, behavior: Behavior) -> list[Cell]:
+        """Return the symbols that state whether the actors of a behaviour are in a step; actors that are variables are left out."""
+        unknown = {variable.name for variable in behavior.variables}
+        return [(BUSY, (actor,)) for actor in timing_of(behavior).actors if actor not in unknown]
 
     def held(self) -> frozenset[str]:
         """Return the situation types that split behaviours require throughout and that other behaviours change."""
@@ -183,12 +202,13 @@ class _Cut:
         timing, its = timing_of(behavior), tuple(parameter.name for parameter in behavior.parameters)
         begun = [(Span.START, e) for e in timing.made(Span.START)]
         asked, _ = projected([one for one in timing.conditions if one[0] is not Span.END], begun)
-        free = ValueCondition(running.name, its, FALSE)
-        made = (*timing.made(Span.START), ValueEffect(running.name, its, TRUE))
-        yield _behavior(behavior, behavior.name + BEGIN, (*asked, free), made)
+        marks = [(running.name, its), *self.busy(behavior)]
+        free = [ValueCondition(*cell, FALSE) for cell in marks]
+        made = (*timing.made(Span.START), *(ValueEffect(*cell, TRUE) for cell in marks))
+        yield _behavior(behavior, behavior.name + BEGIN, (*asked, *free), made)
         held = (*timing.asked(Span.THROUGHOUT), *timing.asked(Span.END))
-        made = (*timing.made(Span.THROUGHOUT), *timing.made(Span.END), ValueEffect(running.name, its, FALSE))
-        ended = _behavior(behavior, behavior.name + END, (*held, replace(free, value=TRUE)), made)
+        made = (*timing.made(Span.THROUGHOUT), *timing.made(Span.END), *(ValueEffect(*cell, FALSE) for cell in marks))
+        ended = _behavior(behavior, behavior.name + END, (*held, replace(free[0], value=TRUE)), made)
         yield replace(ended, cost=0.0, price=None)
 
     def steps(self, task: Task, operators: Sequence[int]) -> tuple[Plan, list[StepEvent]]:
@@ -362,11 +382,11 @@ class _Finder:
                     break
 
     def key(self, node: _SearchNode) -> _StateKey:
-        """Return the identity of a node: the state, and the `busy` time of each running step."""
-        busy = sorted((end, self.busy(node, step)) for end, step in node.running.items())
+        """Return the identity of a node: the state, and the `waiting` time of each running step."""
+        busy = sorted((end, self.waiting(node, step)) for end, step in node.running.items())
         return node.state, tuple(number for pair in busy for number in pair)
 
-    def busy(self, node: _SearchNode, step: int) -> int:
+    def waiting(self, node: _SearchNode, step: int) -> int:
         """Return the minimum time from the begin of a running step to the events that its end must wait for."""
         end = next(operator for operator, its in node.running.items() if its == step)
         times = self.times(node, {end: step})
@@ -436,7 +456,7 @@ class _Finder:
             read = [(c.situation, c.arguments) for c in every if isinstance(c, ValueCondition)]
             self.accesses[operator] = (
                 self.bits(read, terms),
-                self.bits([(e.situation, e.arguments) for e in effects], terms),
+                self.bits([*((e.situation, e.arguments) for e in effects), *self.cut.busy(behavior)], terms),
             )
         return self.accesses[operator]
 

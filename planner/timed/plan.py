@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 
-from confab.planner.plan import Plan, Step
+from confab.planner.plan import Outcome, Plan, Step
 from confab.reasoner.names import brief, known_as
 
 THESE_STEPS = "these steps"
@@ -103,3 +103,19 @@ class TimedPlan:
             yield name, sorted((s for s in self.slots if name in s.actors), key=lambda s: (s.begin, s.end))
         if rest := [slot for slot in self.slots if not slot.actors]:
             yield "", sorted(rest, key=lambda s: (s.begin, s.end))
+
+
+@brief
+@dataclass(frozen=True)
+class TimedOutcome(Outcome):
+    """The outcome of a planning call that found a plan whose steps must overlap, with the schedule of this plan.
+
+    The steps alone needn't be a plan if they are executed one after another.
+    """
+
+    timed: TimedPlan | None = None
+
+
+def schedule_of(outcome: Outcome) -> TimedPlan | None:
+    """Return the schedule of a plan whose steps must overlap, or None for other outcomes."""
+    return outcome.timed if isinstance(outcome, TimedOutcome) else None

@@ -3,23 +3,37 @@
 The checker simulates the primitives on symbols at their times. At each instant, ends come before begins. Every condition is
 evaluated at the times that its span requires. A condition with the span `throughout` is evaluated again after every event. A value
 is pending while a running step is changing it. If another step reads or changes a pending value, the plan has a fault.
+
+If overlapping steps may reach more goals, these events alone determine whether the plan is valid. Otherwise the steps also have
+to be a valid plan in sequence, with the same effects.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from confab.planner.checked_conditions import Arguments
-from confab.planner.plan import Step
+from confab.planner.plan import Plan, Step
 from confab.planner.timed.pieces import Pieces, actors_of, default_actors, duration_of, pieces_of, terms_at
 from confab.planner.timed.plan import Slot, TimedPlan
-from confab.planner.validation import BehaviorReader, Cell, Fault, LoggedState, NewValue, validate
+from confab.planner.validation import (
+    BehaviorReader,
+    Cell,
+    Fault,
+    LoggedState,
+    NewValue,
+    exceptions_of,
+    fitting,
+    validate,
+    violation,
+    wrong_ids,
+)
 from confab.reasoner.amounts import meets
 from confab.reasoner.limits import check
-from confab.reasoner.symbols import FALSE, Behavior, Problem, Times
-from confab.reasoner.timing import only_during
+from confab.reasoner.symbols import FALSE, Behavior, Problem, Symbol, Times
+from confab.reasoner.timing import judged_by_events
 
 
 def validate_timed(
@@ -36,15 +50,26 @@ def validate_timed(
     executed : bool
         Whether the times come from an execution, so that durations may differ from the stated durations.
     """
-    faults: list[Fault] = []
-    if only_during(problem):
-        sequence = None  # a sequence of whole steps has no values that hold only during a step
+    sequence = None
+    if judged_by_events(problem):
+        faults = wrong_ids(problem, timed.plan)
+        for step in timed.plan.steps:
+            if step.steps or step.joined or not fitting(problem, step):
+                faults.append(
+                    Fault(step.path, f"{step}: no such behaviour, or its parameters don't take these arguments")
+                )
     else:
-        faults += validate(problem, timed.plan)
+        faults = validate(problem, timed.plan)
         sequence = _in_sequence(problem, timed.plan.primitives)
     if [slot.step for slot in timed.slots] != list(timed.plan.primitives):
         faults.append(Fault((), "the schedule isn't of the plan's primitives"))
     return faults or list(_TimedExecution(problem, timed, separation, sequence, executed).run())
+
+
+def validate_in_sequence(problem: Problem, plan: Plan) -> list[Fault]:
+    """Return the faults of a plan if its primitives begin and end one after another, without regard to times."""
+    slots = tuple(Slot(step, Fraction(i), Fraction(i + 1)) for i, step in enumerate(plan.primitives))
+    return validate_timed(replace(problem, times=None), TimedPlan(plan, slots), executed=True)
 
 
 @dataclass
@@ -112,6 +137,7 @@ class _TimedExecution:
         self.executed = executed
         self.rules = BehaviorReader(problem)
         self.facts = _Watched(problem, self.rules)
+        self.exceptions = exceptions_of(problem, self.facts)
         self.times = problem.times or Times()
         self.resting = default_actors(problem)
         self.running: dict[int, _Running] = {}
@@ -139,6 +165,8 @@ class _TimedExecution:
             if faults:
                 return
             broken = [f for one in self.running.values() if one.number != number for f in self.holds(one)]
+            if self.sequence is None and (found := violation(self.rules, self.facts, self.exceptions)) is not None:
+                broken.append(Fault(slots[number].step.path, f"{slots[number].step}: {found}"))
             yield from broken
             if broken:
                 return
@@ -275,7 +303,8 @@ class _TimedExecution:
     def in_the_end(self) -> Iterator[Fault]:
         """Yield a fault for each goal that isn't reached in time.
 
-        Also yield a fault for each symbol whose last change comes from another step than in the sequential plan.
+        Also yield a fault for each symbol whose last change comes from another step than in the sequential plan. Without a
+        sequential plan, yield a fault for each changed symbol that has neither its rest value nor its initial value.
         """
         for symbol, wanted in self.problem.goal.items():
             got = self.facts.value(symbol.situation, symbol.arguments) or FALSE
@@ -289,3 +318,14 @@ class _TimedExecution:
             for cell, number in sorted(self.sequence[1].items()):
                 if self.last.get(cell) != number:
                     yield Fault((), f"{cell[0]} of {', '.join(cell[1])} gets its last value from another step")
+            return
+        for situation, arguments in sorted(self.last):
+            symbol, rest = Symbol(situation, arguments), self.problem.domain.situations[situation].rest
+            value = self.facts.value(situation, arguments)
+            sees = self.problem.first_level(symbol) <= self.problem.domain.levels[0]
+            if (
+                sees
+                and symbol not in self.problem.goal
+                and value not in (rest or value, self.problem.initial.get(symbol, FALSE))
+            ):
+                yield Fault((), f"the plan touches {symbol} and leaves it {value}; at rest it is {rest}")

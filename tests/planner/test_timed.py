@@ -12,11 +12,10 @@ from confab.memory import Memory
 from confab.planner.hierarchical.planner import plan
 from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, Step
 from confab.planner.solve import Request, solve
-from confab.planner.timed import concurrent
 from confab.planner.timed.bounds import of_any_plan
 from confab.planner.timed.call import Timed, best_in_time, in_time
 from confab.planner.timed.measuring import measured, with_durations
-from confab.planner.timed.plan import TimedPlan
+from confab.planner.timed.plan import TimedPlan, schedule_of
 from confab.planner.timed.validation import validate_timed
 from confab.reasoner.generate import write_scene
 from confab.reasoner.graph.knowledge import load
@@ -37,7 +36,6 @@ from confab.reasoner.symbols import (
     ValueCondition,
     ValueEffect,
 )
-from confab.reasoner.timing import only_during
 from confab.timing import scheduled
 from worlds.families import family, table
 from worlds.timed import Action, TimedWorld, least_makespan, problem_of, rejected, timed_world
@@ -213,23 +211,24 @@ def test_of_two_late_schedules_the_reason_names_the_times_of_the_less_late(monke
 
 def planned(problem: Problem) -> tuple[Outcome, Timed | None]:
     """Return the plan of a random world: in sequence, or with steps that must overlap."""
-    if not only_during(problem):
-        outcome = solve(Request(problem, limits=Limits(seconds=5.0)))
-        if outcome.status is not Status.UNSOLVABLE:
-            return outcome, None if outcome.plan is None else best_in_time(problem, outcome.plan, shorten=False)
-    return concurrent.plan(problem, Limits(seconds=5.0))
+    outcome = solve(Request(problem, limits=Limits(seconds=5.0)))
+    if (overlapping := schedule_of(outcome)) is not None:
+        return outcome, Timed(overlapping)
+    return outcome, None if outcome.plan is None else best_in_time(problem, outcome.plan, shorten=False)
 
 
 def wrong(world: TimedWorld) -> str | None:
-    """Return the fault of the plan of a world: it is invalid, or shorter than the optimum."""
+    """Return the fault of the plan of a world: it is invalid or shorter than the optimum, or a plan exists despite a proof."""
     outcome, timed = planned(problem_of(world))
-    assert outcome.status is not Status.UNSOLVABLE or only_during(problem_of(world)) == frozenset()
-    if timed is None or timed.plan is None:
+    unsolvable = outcome.status is Status.UNSOLVABLE
+    if not unsolvable and (timed is None or timed.plan is None):
         return None
     try:
         least = least_makespan(world)
     except MemoryError:
-        return rejected(world, timed.plan)
+        return rejected(world, timed.plan) if timed is not None and timed.plan is not None else None
+    if timed is None or timed.plan is None:
+        return None if least is None else "a plan exists, but it is called unsolvable"
     if least is None or timed.plan.makespan < least:
         return f"makespan {timed.plan.makespan}; the least is {least}"
     return rejected(world, timed.plan)

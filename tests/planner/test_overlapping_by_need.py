@@ -1,0 +1,194 @@
+"""A step may need at its end what only another step gives meanwhile: the planner finds such overlaps, no proof overlooks them."""
+
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+import confab
+from confab.planner.certificate_checks import refusal
+from confab.planner.certifying import certify
+from confab.planner.plan import Limits, Outcome, Status
+from confab.planner.solve import Request, solve
+from confab.planner.timed.plan import TimedPlan, schedule_of
+from confab.planner.timed.validation import validate_in_sequence, validate_timed
+from confab.reasoner.pddl.importing import imported
+from confab.reasoner.pddl.syntax import parse
+from confab.reasoner.pddl.turtle import turtle
+from confab.reasoner.symbols import Problem
+from worlds.timed import Action, TimedWorld, least_makespan, problem_of
+
+SPANS = {"s": "at start", "o": "over all", "e": "at end"}
+Literals = str
+"""Literals with their spans: ``s q, e !r`` stands for ``(at start (q))`` and ``(at end (not (r)))``."""
+
+
+def task(initial: str, goal: str, **actions: tuple[int, Literals, Literals]) -> Problem:
+    """Return an imported task; an action has a duration, conditions and effects."""
+
+    def literals(text: Literals) -> str:
+        pairs = [one.split() for one in text.split(",") if one.strip()]
+        return " ".join(f"({SPANS[at]} {f'(not ({f[1:]}))' if f[0] == '!' else f'({f})'})" for at, f in pairs)
+
+    words = {
+        one.split()[1].strip("!") for _, *its in actions.values() for text in its for one in text.split(",") if one
+    }
+    facts = " ".join(f"({one})" for one in sorted({*words, *initial.split(), *goal.split()}))
+    made = [
+        f"(:durative-action {name} :parameters () :duration (= ?duration {seconds}) "
+        f":condition (and {literals(asked)}) :effect (and {literals(effects)}))"
+        for name, (seconds, asked, effects) in actions.items()
+    ]
+    domain = f"(define (domain d) (:requirements :durative-actions) (:predicates {facts}) {' '.join(made)})"
+    initial, goal = (" ".join(f"({one})" for one in text.split()) for text in (initial, goal))
+    return imported(parse(domain, f"(define (problem p) (:domain d) (:init {initial}) (:goal (and {goal})))")).problem
+
+
+WAITING = (4, "s q, e r", "s !q, e p")
+"""Takes q at its begin, and needs r at its end."""
+SOLVABLE = {
+    "what one step takes, another needs missing": (task("q", "p", w=WAITING, v=(2, "s !q", "e r")), 4),
+    "two steps need each other's beginnings": (
+        task("i j", "p q", a=(4, "s i, e y", "s !i, s x, e p"), b=(3, "s j, e x", "s !j, s y, e q")),
+        4,
+    ),
+    "two steps need values that the other only has meanwhile": (
+        task("", "p q", a=(4, "e y", "s x, e !x, e p"), b=(5, "e k", "s y, e q"), c=(1, "s x", "e k")),
+        5,
+    ),
+    "three steps are nested": (
+        task(
+            "i",
+            "g",
+            a=(9, "s i, e r", "s !i, s x, e g"),
+            b=(6, "s x, e t", "s !x, s y, e r"),
+            c=(2, "s y", "s !y, e t"),
+        ),
+        9,
+    ),
+    "a step needs at its end what its own begin takes": (
+        task("r", "p", w=(4, "e r", "s !r, e p"), v=(2, "", "e r")),
+        4,
+    ),
+}
+UNSOLVABLE = {
+    "no step gives what is needed": (task("q", "p", w=WAITING), True),
+    "the other step needs what the first has taken": (task("q", "p", w=WAITING, v=(2, "s q, e q", "e r, e !q")), True),
+    "the other step is too long": (task("q", "p", w=WAITING, v=(5, "s !q", "e r")), False),
+    "a step takes at its begin what it needs throughout": (task("r", "p", w=(4, "o r", "s !r, e p")), True),
+    "two goals never hold at the same time": (task("", "p r", w=(4, "", "s r, e !r"), v=(2, "o r", "e p")), True),
+}
+
+
+@pytest.mark.parametrize("name", SOLVABLE)
+def test_steps_that_need_each_other_overlap(name: str) -> None:
+    problem, makespan = SOLVABLE[name]
+    outcome = solve(Request(problem, limits=Limits(seconds=20.0)))
+    timed = schedule_of(outcome)
+    assert timed is not None, outcome
+    assert timed.makespan == makespan
+    assert validate_timed(problem, timed) == []
+    assert validate_in_sequence(problem, timed.plan) != []
+    assert certify(problem) is None or refusal(problem, certify(problem)) is not None  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", UNSOLVABLE)
+def test_a_task_that_overlaps_dont_help_has_no_plan(name: str) -> None:
+    problem, provable = UNSOLVABLE[name]
+    outcome = solve(Request(problem, limits=Limits(seconds=20.0)))
+    assert outcome.plan is None
+    assert (outcome.status is Status.UNSOLVABLE) == provable, outcome.reason
+    if outcome.certificate is not None:
+        assert refusal(problem, outcome.certificate) is None
+
+
+@pytest.mark.parametrize("name", SOLVABLE)
+@pytest.mark.parametrize("shift", [Fraction(-5), Fraction(5), Fraction(1, 2)])
+def test_the_checker_judges_overlapping_steps_by_their_begins_and_ends(name: str, shift: Fraction) -> None:
+    problem, _ = SOLVABLE[name]
+    timed = schedule_of(solve(Request(problem, limits=Limits(seconds=20.0))))
+    assert timed is not None
+    for number, slot in enumerate(timed.slots):
+        later = replace(slot, begin=slot.begin + shift, end=slot.end + shift)
+        moved = TimedPlan(timed.plan, (*timed.slots[:number], later, *timed.slots[number + 1 :]))
+        faults = validate_timed(problem, moved)
+        assert faults or abs(shift) < 1 or len(timed.slots) > 2, (name, number)
+        longer = replace(slot, end=slot.end + 1)
+        assert validate_timed(
+            problem, replace(timed, slots=(*timed.slots[:number], longer, *timed.slots[number + 1 :]))
+        )
+    assert validate_timed(problem, TimedPlan(replace(timed.plan, steps=timed.plan.steps[:1]), timed.slots[:1]))
+
+
+def test_an_imported_scene_is_planned_with_the_overlap_by_its_file_too(tmp_path: Path) -> None:
+    problem, makespan = SOLVABLE["what one step takes, another needs missing"]
+    (tmp_path / "scene.ttl").write_text(turtle(problem, "title", "description"), encoding="utf-8")
+    result = confab.load(tmp_path / "scene.ttl").plan(time_limit=20)
+    assert result.timed is not None
+    assert result.timed.makespan == makespan
+    assert result.execute().reached
+
+
+JARS = """
+@prefix : <https://example.org/jars#> .
+@prefix c: <https://w3id.org/confab/core#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+@prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
+<https://example.org/jars> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> ; c:symbolicOnly true .
+:Robot a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object .
+:Jar a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object ; c:hasSituationType :LOOSE, :SCREWED, :CLOSED .
+:LOOSE a owl:Class, owl:NamedIndividual, c:SituationType .
+:SCREWED a owl:Class, owl:NamedIndividual, c:SituationType .
+:CLOSED a owl:Class, owl:NamedIndividual, c:SituationType .
+:PRESS a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 1 ; c:duration "PT5S"^^xsd:dayTimeDuration ; c:actor :PRESS.robot ;
+  c:parameter :PRESS.jar, :PRESS.robot ; c:precondition :PRESS.screwed ; c:postcondition :PRESS.tight, :PRESS.closed .
+:PRESS.jar a owl:NamedIndividual, c:Parameter ; c:index 1 ; c:termType :Jar .
+:PRESS.robot a owl:NamedIndividual, c:Parameter ; c:index 2 ; c:termType :Robot .
+:PRESS.screwed a owl:NamedIndividual, c:ValueCondition ; c:situationType :SCREWED ; c:about :PRESS.jar ; c:during c:atEnd .
+:PRESS.tight a owl:NamedIndividual, c:ValueEffect ; c:situationType :LOOSE ; c:about :PRESS.jar ; c:value c:false ;
+  c:during c:atStart .
+:PRESS.closed a owl:NamedIndividual, c:ValueEffect ; c:situationType :CLOSED ; c:about :PRESS.jar .
+:SCREW a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 2 ; c:duration "PT3S"^^xsd:dayTimeDuration ; c:actor :SCREW.robot ;
+  c:parameter :SCREW.jar, :SCREW.robot ; c:precondition :SCREW.tight ; c:postcondition :SCREW.screwed .
+:SCREW.jar a owl:NamedIndividual, c:Parameter ; c:index 1 ; c:termType :Jar .
+:SCREW.robot a owl:NamedIndividual, c:Parameter ; c:index 2 ; c:termType :Robot .
+:SCREW.tight a owl:NamedIndividual, c:ValueCondition ; c:situationType :LOOSE ; c:about :SCREW.jar ; c:negated true ;
+  c:during c:throughout .
+:SCREW.screwed a owl:NamedIndividual, c:ValueEffect ; c:situationType :SCREWED ; c:about :SCREW.jar .
+:jar a owl:NamedIndividual, :Jar . :robot1 a owl:NamedIndividual, :Robot .
+:loose a owl:NamedIndividual, c:SituatedObjectInstance ; c:situationType :LOOSE ; c:about :jar .
+"""
+"""One robot presses the lid of a jar while another one screws it on."""
+SECOND = (
+    ":robot2 a owl:NamedIndividual, :Robot . [] a owl:AllDifferent ; owl:distinctMembers ( :jar :robot1 :robot2 ) ."
+)
+
+
+def jars(folder: Path, more: str) -> Outcome:
+    (folder / "jars.ttl").write_text(JARS + more, encoding="utf-8")
+    return confab.load(folder / "jars.ttl").plan("jar CLOSED true", time_limit=20).outcome
+
+
+def test_one_robot_presses_the_lid_while_another_screws(tmp_path: Path) -> None:
+    timed = schedule_of(jars(tmp_path, SECOND))
+    assert timed is not None
+    assert timed.makespan == 5
+    assert {slot.actors for slot in timed.slots} == {("robot1",), ("robot2",)}
+    outcome = jars(tmp_path, "[] a owl:AllDifferent ; owl:distinctMembers ( :jar :robot1 ) .")
+    assert outcome.status is Status.GAVE_UP  # no proof takes actors into account
+
+
+def test_unsolvable_random_worlds_have_no_plan_with_overlaps_either() -> None:
+    """The world of the exhaustive search has literals at begins and ends of steps."""
+    asks, makes = (("start", (0, True)), ("end", (1, True))), (("start", (0, False)), ("end", (2, True)))
+    needs = Action(4, None, asks, makes)
+    gives = Action(2, None, (("start", (0, False)),), (("end", (1, True)),))
+    for actions, least in (((needs, gives), 4), ((needs,), None)):
+        world = TimedWorld(3, actions, frozenset({0}), ((2, True),))
+        outcome = solve(Request(problem_of(world), limits=Limits(seconds=20.0)))
+        assert least_makespan(world) == least
+        timed = schedule_of(outcome)
+        assert (timed and timed.makespan) == least
+        assert (outcome.status is Status.UNSOLVABLE) == (least is None)
