@@ -309,7 +309,7 @@ def _import_all() -> None:
     rooms = {
         "confab": "cli execution explaining picturing pddl_commands authoring reaching show live",
         "confab.planner": "acting.executive experience.advice hierarchical.bounds paper.hierarchy",
-        "confab.reasoner": "validation.validate graph.query_process reading.affordance",
+        "confab.reasoner": "validation.validate graph.query_process reading.applicable",
     }
     for name in (
         *(f"{room}.{part}" for room, parts in rooms.items() for part in parts.split()),

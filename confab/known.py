@@ -16,7 +16,7 @@ from confab.accepting import Facts, Stated, named_for, several, sparql_of
 from confab.reasoner.graph.inference import infer
 from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, text
 from confab.reasoner.kinds import SAVED, stamped
-from confab.reasoner.limits import within
+from confab.reasoner.limits import checked, within
 from confab.reasoner.names import GUESSING, Named, Names, RightNames, local_name, nearest, right_names
 from confab.reasoner.reading.goals import parse_fact, some_of
 from confab.reasoner.reading.problem import Reading, read, read_names
@@ -431,7 +431,7 @@ class Known(metaclass=RightNames):
         """Return the graph for a query, with the derived facts that the query names; warn once if imports are missing."""
         from confab.following import write_following
         from confab.reasoner.graph.query_process import QueryLimits
-        from confab.reasoner.reading.affordance import SITUATION, write_situation
+        from confab.reasoner.reading.applicable import SITUATION, write_situation
 
         self.settle()
         if SITUATION in sparql:
@@ -478,7 +478,7 @@ class Known(metaclass=RightNames):
         The method `query` answers the returned query for the initial state.
         """
         from confab.reasoner.graph.query_process import standing_alone
-        from confab.reasoner.reading.affordance import applicable_query
+        from confab.reasoner.reading.applicable import applicable_query
         from confab.reasoner.reading.quantification import behavior_named
 
         query = applicable_query(self.knowledge, self.reading, behavior_named(self.reading, behavior))
@@ -516,20 +516,19 @@ class Known(metaclass=RightNames):
         KnowledgeError
             The object doesn't exist.
         """
-        from confab.reasoner.reading.affordance import affordances
+        from confab.planner.affordances import affordances
 
         known = self.problem.individuals
         if of not in (None, "all", *known):
             raise KnowledgeError(
                 f"unknown object '{of}'{nearest(str(of), known, f'known: {some_of([*self.objects])}')}"
             )
-        found = affordances(self.knowledge, self.reading)
+        found = affordances(self.problem, of=None if of == "all" else of)
         return Table(
             ("object", "behavior", "arguments", "situation", "effect"),
             tuple(
                 (a.object, a.behavior, " ".join(a.arguments), _sentence(a.situation), _sentence(a.effect))
-                for a in found
-                if of in (None, "all", a.object)
+                for a in checked(found, "listing affordances")
             ),
         )
 

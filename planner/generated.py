@@ -32,6 +32,23 @@ def key_written(arguments: Sequence[str]) -> str:
     return written(arguments[0]) if len(arguments) == 1 else tuple_written(map(written, arguments))
 
 
+class CodeBlock:
+    """Lines of Python code; each opened line indents the lines that follow."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self._depth = 0
+
+    def add(self, line: str) -> None:
+        """Add a line."""
+        self.lines.append("    " * self._depth + line)
+
+    def open(self, line: str) -> None:
+        """Add a line, and indent the lines that follow."""
+        self.add(line)
+        self._depth += 1
+
+
 @lru_cache(maxsize=256)
 def code(source: str) -> CodeType:
     """Return the compiled code of Python source."""

@@ -21,7 +21,7 @@ from typing import TypeAlias, TypeGuard
 
 from confab.planner.amount_transitions import approaches_goal
 from confab.planner.derived_facts import CompiledRules
-from confab.planner.generated import identifier, tuple_written, written
+from confab.planner.generated import CodeBlock, identifier, tuple_written, written
 from confab.planner.hierarchical.symmetry import SymmetryClasses, representatives
 from confab.planner.transitions import Forward, Key, PythonWriter, Table, in_binding_order
 from confab.reasoner.amounts import Amount, inside, terms_of
@@ -71,23 +71,6 @@ class Achiever:
     determining: Sequence[Condition] = ()
     rule: bool = False
     deep: bool = False
-
-
-class CodeBlock:
-    """Lines of Python code; each opened line indents the lines that follow."""
-
-    def __init__(self) -> None:
-        self.lines: list[str] = []
-        self._depth = 0
-
-    def add(self, line: str) -> None:
-        """Add a line."""
-        self.lines.append("    " * self._depth + line)
-
-    def open(self, line: str) -> None:
-        """Add a line, and indent the lines that follow."""
-        self.add(line)
-        self._depth += 1
 
 
 def determines(condition: Condition, bound: AbstractSet[str]) -> TypeGuard[ValueCondition]:

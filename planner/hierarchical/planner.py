@@ -24,6 +24,7 @@ from dataclasses import replace
 from functools import partial
 from time import perf_counter
 
+from confab.planner.applicable import MOST_LOOPS
 from confab.planner.hierarchical.agenda import Agenda
 from confab.planner.hierarchical.call import Call, Compiled, as_refined, compiled
 from confab.planner.hierarchical.operators import quantified
@@ -218,18 +219,17 @@ def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool) -> Outcome:
 
 
 def is_vast(problem: Problem) -> bool:
-    """Return whether a task of one level has too many quantified behaviours to be grounded first."""
-    from confab.planner.hierarchical.ungrounded import joinable
-
+    """Return whether a task of one level has too many quantified behaviours to be grounded first, and can be compiled."""
     (level,) = problem.domain.levels
-    return quantified(problem, level) > VAST and joinable(problem, level)
+    compiles = all(len(behavior.kinds) <= MOST_LOOPS for behavior in problem.domain.at_level(level))
+    return compiles and quantified(problem, level) > VAST
 
 
 def without_grounding(call: Call, trials: int) -> bool:
     """Search the lowest level without grounding; return whether the steps of the call are a plan now."""
-    from confab.planner.hierarchical.ungrounded import UngroundedSearch, joinable
+    from confab.planner.hierarchical.ungrounded import UngroundedSearch
 
-    steps = UngroundedSearch(call, trials).plan() if joinable(call.problem, call.program.levels[-1]) else None
+    steps = UngroundedSearch(call, trials).plan()
     call.steps = steps or call.steps
     return steps is not None
 

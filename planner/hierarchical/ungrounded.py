@@ -1,7 +1,6 @@
 """Search of one level without grounding, for levels with too many quantified behaviours.
 
-In a state, the applicable behaviours are found by joins: generated Python code binds the parameters of a behaviour one after
-another from the facts of the state, the static relations and the classes, whichever has the fewest candidates.
+In a state, the applicable behaviours are found by joins (`confab.planner.applicable`).
 
 The states with the fewest unmet goals are expanded first. Among these states, novel states come first, and then the oldest state,
 so that plans are short. A state is novel if it has a fact that no earlier state with as many unmet goals had. A successor with
@@ -15,31 +14,18 @@ ICAPS 2022).
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import partial, reduce
-from itertools import islice, product
-from math import prod
+from functools import reduce
+from itertools import islice
 from operator import xor
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
-from confab.planner.generated import identifier, tuple_written, written
+from confab.planner.applicable import joins
 from confab.planner.hierarchical.call import Call
-from confab.planner.hierarchical.operators import CodeBlock, Program
 from confab.planner.hierarchical.refinement import RefinedStep
 from confab.planner.plan import Counts
-from confab.planner.transitions import Cell, Change, Table
-from confab.reasoner.language import is_variable, mentions, needs
-from confab.reasoner.limits import check
-from confab.reasoner.symbols import (
-    AnyOf,
-    Behavior,
-    Condition,
-    EqualityCondition,
-    Problem,
-    RelationCondition,
-    ValueCondition,
-)
+from confab.planner.transitions import Cell, Change
 
 TRIAL = 10
 """The work of a trial in the unit of the budget."""
@@ -47,12 +33,6 @@ STATES_OF_A_TRIAL = 10
 """Number of states of a path whose changes are applied in the time of one trial."""
 MOST_FORCED = 1_000
 """Maximum number of states in a row that aren't ranked, since they have only one successor."""
-MOST_LOOPS = 15
-"""Maximum number of terms of a behaviour; Python nests at most 20 loops."""
-MOST_COMBINED = 16
-"""Maximum number of combinations of alternatives of a behaviour that are joined separately."""
-Join: TypeAlias = "Callable[[], Iterator[tuple[str, ...]]]"
-"""Function that yields arguments with which a behaviour may be applicable in the current state of a table."""
 
 
 class GroundMove(NamedTuple):
@@ -87,7 +67,7 @@ class UngroundedSearch:
         self.most = min(most, (self.space.most_work - self.space.worked) / TRIAL)
         self.level = call.program.levels[-1]
         self.trials, self.counts = 0, Counts()
-        self.joins = joins(call.program, self.level, self.table)
+        self.joins = joins(call.program.writer, call.problem.domain.at_level(self.level), self.table)
         situations = call.problem.domain.situations.values()
         self.amounts = {situation.name for situation in situations if situation.quantity is not None}
         self.facts: dict[tuple[int, Cell], set[str]] = {}
@@ -156,11 +136,7 @@ class UngroundedSearch:
         """Yield the applicable behaviours that change the current state."""
         now, forward = self.table.now, self.space.forward
         for name, join in self.joins.items():
-            tried = set[tuple[str, ...]]()
             for arguments in join():
-                if arguments in tried:
-                    continue
-                tried.add(arguments)
                 self.trials += 1
                 if self.trials > self.most:
                     return
@@ -211,125 +187,3 @@ class UngroundedSearch:
             novel = novel or value not in values
             values.add(value)
         heapq.heappush(self.open, (state.unmet, not novel, len(self.seen), state, successors))
-
-
-# ----------------------------------------------------------------------------------------------------------------- joins
-
-
-def joinable(problem: Problem, level: int) -> bool:
-    """Return whether Python can nest the loops over the terms of each behaviour of a level."""
-    return all(len(behavior.kinds) <= MOST_LOOPS for behavior in problem.domain.at_level(level))
-
-
-def joins(program: Program, level: int, table: Table) -> Mapping[str, Join]:
-    """Return the joins of the behaviours of a level, bound to a table; the joins suit the present numbers of facts in the table."""
-    sizes = {(name, value): len(keys) for name, values in table.holders.items() for value, keys in values.items()}
-    bind = program.writer.function(_lines(program, level, sizes), "applicable")
-    found: Mapping[str, Join] = bind(table.now, table.holders)
-    return found
-
-
-def _lines(program: Program, level: int, sizes: Mapping[tuple[str, str], int]) -> Iterator[str]:
-    """Yield the lines that define the functions `Join` of the behaviours of a level in the dictionary `applicable`."""
-    yield "applicable = {}"
-    for behavior in program.domain.at_level(level):
-        name = identifier("join", behavior.name)
-        yield f"def {name}():"
-        yield "    if False: yield ()"
-        for conditions in _alternatives(behavior.preconditions):
-            for line in _joined(program, behavior, conditions, sizes):
-                yield "    " + line
-        yield f"applicable[{behavior.name!r}] = {name}"
-
-
-def _alternatives(conditions: Sequence[Condition]) -> Iterable[Sequence[Condition]]:
-    """Return conjunctions, one of which holds if the given conditions hold: each has one alternative of each `AnyOf`."""
-    choices = [c for c in conditions if isinstance(c, AnyOf) and not c.negated]
-    if prod(len(c.alternatives) for c in choices) > MOST_COMBINED:
-        return [conditions]
-    others = [c for c in conditions if c not in choices]
-    return [
-        [*others, *(c for group in groups for c in group)] for groups in product(*(c.alternatives for c in choices))
-    ]
-
-
-def _joined(
-    program: Program, behavior: Behavior, conditions: Sequence[Condition], sizes: Mapping[tuple[str, str], int]
-) -> list[str]:
-    """Return the lines that yield the arguments with which conditions may hold, by a loop for each source of candidates."""
-    writer, kinds, block = program.writer, behavior.kinds, CodeBlock()
-    waiting, bound, tests = list(conditions), set[str](), list[str]()
-    parameters = [p.name for p in behavior.parameters]
-    while True:
-        while ready := next((c for c in waiting if _open_terms(c, kinds) <= bound), None):
-            waiting.remove(ready)
-            tests.append(writer.expression(ready, bound, kinds, behavior.name))
-        if tests:
-            block.open(f"if {' and '.join(f'({test})' for test in tests)}:")
-        if bound.issuperset(parameters):
-            block.add(f"yield {tuple_written(map(written, parameters))}")
-            return block.lines
-        loop, terms = _loop(program, behavior, waiting, bound, sizes)
-        if bound:
-            block.add(f"{writer.constant(('look', 'time'), partial(check, 'searching'))}()")
-        block.open(loop)
-        tests = [f"{written(term)} == {source}" for term, source in terms if term in bound or not is_variable(term)]
-        fresh = {term: source for term, source in reversed(terms) if is_variable(term) and term not in bound}
-        for term, source in fresh.items():
-            block.add(f"{written(term)} = {source}")
-            tests.append(writer.member(term, kinds[term]))
-        tests += [f"{written(term)} == {source}" for term, source in terms if term in fresh and source != fresh[term]]
-        bound.update(fresh)
-
-
-def _open_terms(condition: Condition, kinds: Mapping[str, str]) -> set[str]:
-    """Return the terms that must be bound before a condition is tested; `kinds` contains the terms of the behaviour."""
-    if isinstance(condition, ValueCondition) and not condition.negated:
-        return needs(condition)
-    return mentions(condition) & kinds.keys()
-
-
-def _loop(
-    program: Program,
-    behavior: Behavior,
-    waiting: Sequence[Condition],
-    bound: set[str],
-    sizes: Mapping[tuple[str, str], int],
-) -> tuple[str, list[tuple[str, str]]]:
-    """Return the head of a loop over the fewest candidates for unbound terms, and the terms, each with its expression."""
-    found: list[tuple[float, str, list[tuple[str, str]]]] = []
-    for condition in waiting:
-        match condition:
-            case EqualityCondition(left, right, False):
-                for term, other in ((left, right), (right, left)):
-                    if is_variable(term) and term not in bound and (other in bound or not is_variable(other)):
-                        found.append((0.5, f"for t in ({written(other)},):", [(term, "t")]))
-            case RelationCondition(relation, arguments, False):
-                unbound = {a for a in arguments if is_variable(a)} - bound
-                for term in sorted(unbound):
-                    if arguments.count(term) == 1:
-                        text, fan = program.writer.adjacent(relation, arguments, term, unbound)
-                        found.append((fan, f"for t in {text}:", [(term, "t")]))
-            case ValueCondition(situation, arguments, value, False) if situation not in program.domain.rules:
-                given = not is_variable(value) or value in bound
-                keys = (
-                    [(arguments[0], "t")] if len(arguments) == 1 else [(a, f"t[{i}]") for i, a in enumerate(arguments)]
-                )
-                size = sum(
-                    number
-                    for (name, one), number in sizes.items()
-                    if name == situation and (one == value or is_variable(value))
-                )
-                if given and program.writer.listed(situation, value):
-                    text = f"{identifier('holders', situation)}.get({written(value)}, ())"
-                    found.append((max(size, 1.0), f"for t in {text}:", keys))
-                elif not given:
-                    text = f"{identifier('now', situation)}.items()"
-                    found.append((max(size, 1.0), f"for t, u in {text}:", [*keys, (value, "u")]))
-    for parameter in behavior.parameters:
-        if parameter.name not in bound:
-            members = program.problem.classes.get(parameter.kind, ())
-            text = program.writer.constant(("members", parameter.kind), members)
-            found.append((len(members) + 1.0, f"for t in {text}:", [(parameter.name, "t")]))
-    _, head, terms = min(found, key=lambda entry: entry[0])
-    return head, terms

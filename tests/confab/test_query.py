@@ -17,7 +17,7 @@ from confab.following import _following
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.graph.query_process import QueryLimits
 from confab.reasoner.limits import LimitError, within
-from confab.reasoner.reading.affordance import SITUATION
+from confab.reasoner.reading.applicable import SITUATION
 from confab.reasoner.validation.validate import quick_errors
 
 CUP1 = "https://w3id.org/confab/beverage-serving#cup1"

@@ -1,4 +1,4 @@
-"""Situated affordances: the behaviours that each object affords in a state, found by SPARQL.
+"""SPARQL queries for the arguments with which a behaviour is applicable in a state.
 
 A state is written into a separate named graph (`SITUATION`) with one fact for each symbol, including default values. The
 preconditions of a behaviour become SPARQL graph patterns:
@@ -17,18 +17,16 @@ negated condition          ``FILTER NOT EXISTS { … }``
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 from fractions import Fraction
-from itertools import product
+from itertools import chain, product
 
 import pyoxigraph as ox
 
-from confab.reasoner.aggregates.totals import EnumeratedState
-from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, Number, done, inside, number, written
+from confab.reasoner.amounts import Amount, Calculation, Expression, Measure
 from confab.reasoner.derivation import circular, strata
 from confab.reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph, text
-from confab.reasoner.limits import check
+from confab.reasoner.limits import checked
 from confab.reasoner.reading.problem import Reading
 from confab.reasoner.reading.restating import VALUE_PROPERTIES, said, value_properties
 from confab.reasoner.symbols import (
@@ -47,7 +45,6 @@ from confab.reasoner.symbols import (
     State,
     Symbol,
     ValueCondition,
-    ValueEffect,
     Witness,
     allowed,
 )
@@ -62,47 +59,15 @@ MOST_TOGETHER = 3
 """Maximum number of other effects on an amount. If a behaviour has more, the query doesn't test the bounds of the amount."""
 
 
-@dataclass(frozen=True, order=True)
-class Affordance:
-    """A behaviour that an object affords in a situation.
-
-    Attributes
-    ----------
-    object : str
-    behavior : str
-    arguments : tuple of str
-        The arguments of the behaviour, including the object.
-    situation : tuple of Fact
-        The facts that satisfy positive value conditions among the preconditions, and the amounts that preconditions compare.
-    effect : tuple of Fact
-        The values and amounts that the behaviour's effects give.
-    """
-
-    object: str
-    behavior: str
-    arguments: tuple[str, ...]
-    situation: tuple[Fact, ...]
-    effect: tuple[Fact, ...]
-
-
-def write_situation(graph: KnowledgeGraph, reading: Reading, state: State | None = None) -> dict[Symbol, str]:
-    """Write a state (by default the initial state) and its derived facts into the graph `SITUATION`, and return them."""
+def write_situation(graph: KnowledgeGraph, reading: Reading, state: State | None = None) -> None:
+    """Write a state (by default the initial state) and the facts that follow from the state into the graph `SITUATION`."""
     properties = value_properties(graph)
     graph.store.clear_graph(ox.NamedNode(SITUATION))
-    written_facts: dict[Symbol, str] = {}
-
-    def write(symbol: Symbol, value: str) -> None:
-        written_facts[symbol] = value
-        if not len(written_facts) % 4096:
-            check("writing the situation")
+    stated = (state or reading.problem.initial).items()
+    following = ((symbol, TRUE) for symbol in _following(graph, reading))
+    for count, (symbol, value) in enumerate(checked(chain(stated, following), "writing the situation")):
         prop = properties.get(reading.names.iri(symbol.situation))
-        graph.extend("situation", said(reading, Fact(symbol, value), prop, ox.BlankNode(f"fact{len(written_facts)}")))
-
-    for symbol, value in (state or reading.problem.initial).items():
-        write(symbol, value)
-    for symbol in _following(graph, reading) if reading.problem.domain.rules else ():
-        write(symbol, TRUE)
-    return written_facts
+        graph.extend("situation", said(reading, Fact(symbol, value), prop, ox.BlankNode(f"fact{count}")))
 
 
 def _following(graph: KnowledgeGraph, reading: Reading) -> Iterator[Symbol]:
@@ -136,89 +101,16 @@ def _names(condition: Condition, variable: str) -> bool:
             return False
 
 
-def applicable_query(
-    graph: KnowledgeGraph, reading: Reading, behavior: Behavior, when: Sequence[Condition] = ()
-) -> str:
+def applicable_query(graph: KnowledgeGraph, reading: Reading, behavior: Behavior) -> str:
     """Return the SPARQL query for the arguments and variable bindings with which a behaviour is applicable.
 
-    The query reads the graph `SITUATION`, which `write_situation` fills. `when` contains further conditions, in addition to the
-    preconditions.
+    The query reads the graph `SITUATION`, which `write_situation` fills.
     """
-    return _PatternWriter(graph, reading).query(behavior, when)
-
-
-def affordances(graph: KnowledgeGraph, reading: Reading, state: State | None = None) -> list[Affordance]:
-    """Return the sorted affordances of all objects in a state (by default the initial state).
-
-    Examples
-    --------
-    >>> from confab.reasoner.graph.knowledge import load
-    >>> from confab.reasoner.graph.inference import infer
-    >>> from confab.reasoner.reading.problem import read
-    >>> graph = load("living-room")
-    >>> _ = infer(graph)
-    >>> for found in affordances(graph, read(graph)):
-    ...     print(found.object, found.behavior, *found.effect)
-    bread2 EAT bread2 REST_OF_FOOD eaten
-    cup1 CLEAR_AWAY cup1 PLACE counter_right
-    """
-    problem, now = reading.problem, write_situation(graph, reading, state)
-    world = EnumeratedState(problem.classes, problem.relations, now, problem.domain.situations)
-    writer = _PatternWriter(graph, reading)
-    authored = problem.domain.authored
-    found = []
-    for behavior in problem.domain.behaviors.values():
-        for bindings in writer.rows(behavior):
-            arguments = tuple(bindings[parameter.name] for parameter in behavior.parameters)
-            situation = tuple(sorted({*_facts(behavior.asked, bindings, world)}))
-            effect = tuple(
-                sorted(fact for fact in _effect(behavior, bindings, world) if fact.symbol.situation in authored)
-            )
-            about = {fact.symbol.arguments[0] for fact in (*situation, *effect)}
-            objects = [o for o in dict.fromkeys(arguments) if o in about]
-            found += [Affordance(o, behavior.name, arguments, situation, effect) for o in objects]
-    return sorted(found)
+    return _PatternWriter(graph, reading).query(behavior)
 
 
 def _pairs(graph: KnowledgeGraph, query: str) -> Iterator[tuple[str, str]]:
     return ((text(one), text(other)) for one, other in graph.select(query, SCENE))
-
-
-def _facts(conditions: Sequence[Condition], bindings: Mapping[str, str], world: EnumeratedState) -> Iterator[Fact]:
-    """Yield the facts of positive value conditions, and the amounts that comparisons name, for the given variable bindings."""
-    for condition in conditions:
-        if isinstance(condition, ValueCondition) and not condition.negated:
-            yield Fact(_symbol(condition, bindings), bindings.get(condition.value, condition.value))
-        elif isinstance(condition, Comparison):
-            for part in (*inside(condition.left), *inside(condition.right)):
-                if isinstance(part, Amount):
-                    symbol = _symbol(part, bindings)
-                    amount = world.value(symbol.situation, symbol.arguments)
-                    if amount is not None:
-                        yield Fact(symbol, amount)
-
-
-def _effect(behavior: Behavior, bindings: Mapping[str, str], world: EnumeratedState) -> Iterator[Fact]:
-    """Yield the facts that the effects of a behaviour give, including conditional effects whose conditions hold."""
-    values: dict[Symbol, str] = {}
-    amounts: dict[Symbol, Number] = {}
-    for effect in behavior.every_effect:
-        for terms in world.solutions(effect.when, dict(bindings), behavior.kinds, ()):
-            symbol = _symbol(effect, terms)
-            before = world.value(symbol.situation, symbol.arguments)
-            if before is None:
-                continue  # the effect doesn't change a symbol that doesn't exist
-            if isinstance(effect, ValueEffect):
-                values[symbol] = terms.get(effect.value, effect.value)
-            else:
-                old = amounts.get(symbol, number(before))
-                amounts[symbol] = done(effect.operation, old, world.worth(effect.amount, terms))
-    values |= {symbol: written(amount) for symbol, amount in amounts.items() if isinstance(amount, Fraction)}
-    yield from (Fact(symbol, value) for symbol, value in values.items())
-
-
-def _symbol(said: ValueCondition | ValueEffect | AmountEffect | Amount, bindings: Mapping[str, str]) -> Symbol:
-    return Symbol(said.situation, tuple(bindings.get(argument, argument) for argument in said.arguments))
 
 
 def allowed_together(behavior: Behavior, situations: Mapping[str, SituationType]) -> Iterator[Condition]:
@@ -286,26 +178,26 @@ class _PatternWriter:
         self.numbers = 0  # number of variables for amounts
         self.relations = {text(iri) for (iri,) in graph.select(RELATION_PROPERTIES, SCENE)}
 
-    def rows(self, behavior: Behavior, when: Sequence[Condition] = ()) -> Iterator[dict[str, str]]:
+    def rows(self, behavior: Behavior) -> Iterator[dict[str, str]]:
         """Yield each binding of parameters and variables with which a behaviour is applicable; no binding is repeated."""
-        names = self.names(behavior, when)
-        for row in self.graph.select(self.query(behavior, when, ordered=False), SCENE):
+        names = self.names(behavior)
+        for row in self.graph.select(self.query(behavior, ordered=False), SCENE):
             yield {name: self.reading.names.short(text(term)) for name, term in zip(names, row, strict=True)}
 
-    def names(self, behavior: Behavior, when: Sequence[Condition]) -> list[str]:
+    def names(self, behavior: Behavior) -> list[str]:
         """Return the variables that a query binds: the parameters in order, then the variables determined by value conditions."""
         found = dict.fromkeys(parameter.name for parameter in behavior.parameters)
-        for condition in (*behavior.preconditions, *when):
+        for condition in behavior.preconditions:
             if isinstance(condition, ValueCondition) and not condition.negated and condition.value.startswith("?"):
                 found[condition.value] = None
         return list(found)
 
-    def query(self, behavior: Behavior, when: Sequence[Condition] = (), ordered: bool = True) -> str:
-        names = self.names(behavior, when)
+    def query(self, behavior: Behavior, ordered: bool = True) -> str:
+        names = self.names(behavior)
         kinds = behavior.kinds
         situations = self.reading.problem.domain.situations
         bounds = (*allowed(behavior, situations), *allowed_together(behavior, situations), *calculable(behavior))
-        conditions = (*behavior.preconditions, *bounds, *when)
+        conditions = (*behavior.preconditions, *bounds)
         lines = [f"{{ SELECT DISTINCT {name} WHERE {{ {self.typed(name, kinds[name])} }} }}" for name in names]
         lines += [line for condition in conditions for line in self.pattern(condition)]
         head = f"# {behavior.name}: where its preconditions hold in the graph {SITUATION}\n"

@@ -1,4 +1,4 @@
-"""The affordances of an object depend on the situation, and a SPARQL query on the graph returns them."""
+"""The affordances of an object depend on the situation, and a SPARQL query on the graph returns the same behaviours."""
 
 from functools import cache
 from pathlib import Path
@@ -6,11 +6,12 @@ from pathlib import Path
 import pytest
 
 import confab
+from confab.planner.affordances import affordances
 from confab.planner.paper.transitions import Model, ground
 from confab.reasoner.graph.inference import infer
 from confab.reasoner.graph.knowledge import KnowledgeGraph, load, text
 from confab.reasoner.names import local_name
-from confab.reasoner.reading.affordance import SITUATION, affordances, applicable_query, write_situation
+from confab.reasoner.reading.applicable import SITUATION, applicable_query, write_situation
 from confab.reasoner.reading.problem import Reading, read
 from confab.reasoner.symbols import State, Symbol
 from tests.ontology.faults import skeleton
@@ -25,12 +26,12 @@ def scene(name: str | Path) -> tuple[KnowledgeGraph, Reading]:
 
 def afforded(name: str | Path, **changes: str) -> set[tuple[str, ...]]:
     """Return (object, behaviour, arguments …) in the initial situation with changes, written as ``object__SITUATION=value``."""
-    graph, reading = scene(name)
+    reading = scene(name)[1]
     state = dict(reading.problem.initial)
     for key, value in changes.items():
         about, situation = key.split("__")
         state[Symbol(situation, (about,))] = value
-    return {(found.object, found.behavior, *found.arguments) for found in affordances(graph, reading, state)}
+    return {(found.object, found.behavior, *found.arguments) for found in affordances(reading.problem, state)}
 
 
 def test_a_cup_affords_pouring_if_a_drink_is_wanted() -> None:
@@ -63,15 +64,15 @@ def test_owl_inference_finds_the_places_in_the_living_room() -> None:
 
 
 def test_an_affordance_is_object_situation_behaviour_and_effect() -> None:
-    graph, reading = scene("living-room")
-    found = next(a for a in affordances(graph, reading) if a.behavior == "CLEAR_AWAY")
+    reading = scene("living-room")[1]
+    found = next(a for a in affordances(reading.problem) if a.behavior == "CLEAR_AWAY")
     assert [str(fact) for fact in found.situation] == ["cup1 CONTENT empty", "cup1 PLACE table_left"]
     assert [str(fact) for fact in found.effect] == ["cup1 PLACE counter_right"]
 
 
 def test_an_affordance_has_the_amounts_that_a_behaviour_compares_and_changes() -> None:
-    graph, reading = scene("canteen-small")
-    found = {(a.behavior, *a.arguments): a for a in affordances(graph, reading)}
+    reading = scene("canteen-small")[1]
+    found = {(a.behavior, *a.arguments): a for a in affordances(reading.problem)}
     refill, drive = found["L1_REFILL", "jug1"], found["L2_DRIVE", "trolley", "tap"]
     assert [str(fact) for fact in (*refill.situation, *refill.effect)] == ["jug1 SERVINGS 1.5", "jug1 SERVINGS 2"]
     assert [str(fact) for fact in drive.situation] == ["trolley BATTERY 6", "trolley TROLLEY_AT dock"]
@@ -79,8 +80,8 @@ def test_an_affordance_has_the_amounts_that_a_behaviour_compares_and_changes() -
 
 
 def test_the_effects_of_an_affordance_are_of_situation_types_of_the_author() -> None:
-    graph, reading = scene("tour-small")
-    effects = {str(fact) for found in affordances(graph, reading) for fact in found.effect}
+    reading = scene("tour-small")[1]
+    effects = {str(fact) for found in affordances(reading.problem) for fact in found.effect}
     assert "bridge SEEN true" in effects
     assert not [fact for fact in effects if "." in fact]
 
@@ -134,9 +135,10 @@ def test_an_added_subclass_and_its_individual_are_quantified_over(tmp_path: Path
 def test_affordances_take_defined_situation_types_into_account() -> None:
     graph = load("packing-small")
     reading = read(graph)
-    found = {(one.object, one.behavior) for one in affordances(graph, reading)}
+    found = {(one.object, one.behavior) for one in affordances(reading.problem)}
     assert ("chest", "OPEN") in found
     assert "casket" not in {name for name, _ in found}  # the chest around the casket is shut
+    write_situation(graph, reading)
     inside = "SELECT ?x ?y WHERE { ?x <https://w3id.org/confab/packing#isInside> ?y }"
     rows = {
         tuple(local_name(text(term)) for term in row) for row in graph.select(inside, [SITUATION.rsplit(":", 1)[-1]])
@@ -174,3 +176,23 @@ def test_a_behaviour_is_applicable_only_if_its_price_and_the_numbers_of_its_effe
     assert [tuple(row) for row in scene.query(scene.applicable_query("DRAIN"))] == [("one",)]
     filled = {tuple(row) for row in scene.query(scene.applicable_query("FILL"))}
     assert filled == {(tank, tap) for tank in ("one", "two", "three") for tap in ("one", "two")}
+
+
+def test_affordances_are_listed_beside_a_behaviour_without_parameters() -> None:
+    opened = """:OPEN_ALL a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 3 ; c:update \"\"\"
+    DELETE { :one :level ?old } INSERT { :one :level 5 } WHERE { :one :level ?old }\"\"\" .
+"""
+    scene = confab.load(WATER + opened)
+    assert "OPEN_ALL" in scene.problem.domain.behaviors
+    assert [tuple(row)[:3] for row in scene.affordances("two")] == [
+        ("two", "FILL", "two one"),
+        ("two", "FILL", "two two"),
+    ]
+
+
+def test_the_affordances_of_one_object_are_those_of_all_objects_that_it_has() -> None:
+    scene = confab.load("beverage-serving")
+    rows = [tuple(row) for row in scene.affordances()]
+    assert rows == sorted(rows) and len({row[0] for row in rows}) > 3
+    for name in {row[0] for row in rows}:
+        assert [tuple(row) for row in scene.affordances(name)] == [row for row in rows if row[0] == name]
