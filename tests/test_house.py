@@ -192,6 +192,7 @@ def astray(graph: Mapping[str, set[str]]) -> list[str]:
                 "transitions",
                 "generated",
                 "amount_transitions",
+                "applicable",
                 "derived_facts",
                 *SUBROOMS[room],
             }:

@@ -340,7 +340,9 @@ def _definitions(schema: OntologySchema, names: Names) -> Definitions:
         kinds[prop] = "|".join(map(names.short, owners[situation])), names.short(situation)
     for iri in schema.of_kind("Relation", "ReachRelation"):
         ends = (schema.nodes[iri].get(RDFS + end, ()) for end in ("domain", "range"))
-        one, other = (names.short(end[0]) if len(end) == 1 and ":" in end[0] and end[0] != THING else "" for end in ends)
+        one, other = (
+            names.short(end[0]) if len(end) == 1 and ":" in end[0] and end[0] != THING else "" for end in ends
+        )
         kinds[iri] = one, other
     nodes = {**schema.expressions, **schema.axioms, **schema.swrl}
     found = Definitions(nodes, properties, names, schema.numbers, kinds)
