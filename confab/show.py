@@ -18,6 +18,8 @@ STYLES = ("bold cyan", "green", "default")
 Notes = Mapping[tuple[int, ...], str]
 """Remarks on steps, such as verdicts, by the step's path."""
 
+CONTROL = dict.fromkeys((7, 8, 11, 12, 13))
+"""Control characters that a terminal would execute, for `str.translate`."""
 UNLIMITED = 100_000
 """Width in columns of an output that isn't a terminal; the width is so large that no line is wrapped or cut."""
 
@@ -31,9 +33,13 @@ def page() -> Console:
 
 def show(what: Any) -> None:
     """Print an object that the library rich can show, to stdout; lines are wrapped only in a terminal."""
+    shown = what.__rich__() if hasattr(type(what), "__rich__") else what
+    if isinstance(shown, PlanTree) and not sys.stdout.isatty():
+        sys.stdout.writelines(shown.lines())
+        return
     console = page()
     with console.capture() as text:  # rich would end the process with exit code 1 if the reader of a pipe has ended
-        console.print(what, markup=False, highlight=False)
+        console.print(shown, markup=False, highlight=False)
     sys.stdout.write(text.get())
 
 
@@ -47,21 +53,24 @@ class PlanTree:
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Tree | Segment]:
         """Yield a rich tree for a terminal. Yield plain text for other outputs, since rich is slow for large plans."""
-        from rich.control import strip_control_codes
-        from rich.segment import Segment
-        from rich.text import Text
-        from rich.tree import Tree
-
         if console.is_terminal:
+            from rich.text import Text
+            from rich.tree import Tree
+
             tree = Tree(Text(self.title), guide_style="dim")
             for step in self.plan.steps:
                 _grow(tree, step, self.notes)
             yield tree
         else:
-            yield Segment(f"{strip_control_codes(self.title)}\n")
+            from rich.segment import Segment
+
             # Each line becomes a separate segment, since rich splits a segment of many lines in quadratic time.
-            for line in _drawn(self.plan.steps, self.notes, ""):
-                yield Segment(f"{strip_control_codes(line)}\n")
+            yield from map(Segment, self.lines())
+
+    def lines(self) -> Iterator[str]:
+        """Yield the lines of plain text, without control characters."""
+        for line in (self.title, *_drawn(self.plan.steps, self.notes, "")):
+            yield f"{line.translate(CONTROL)}\n"
 
 
 def plan_tree(plan: Plan, title: str, notes: Notes | None = None) -> PlanTree:

@@ -11,6 +11,7 @@ from typing import Protocol
 
 from confab.planner.plan import Plan, Step
 from confab.planner.validation import BehaviorReader, LoggedState
+from confab.reasoner.limits import checked
 from confab.reasoner.symbols import Problem
 
 TRIFLE = 2.0**-20
@@ -61,7 +62,7 @@ def in_circles(problem: Problem, plan: Plan) -> int:
     rules, facts = BehaviorReader(problem), LoggedState(problem, problem.initial)
     values: dict[tuple[str, tuple[str, ...]], str | None] = {}
     now, states = 0, [0]  # a state is represented by the exclusive or of the hashes of its facts
-    for step in plan.primitives:
+    for step in checked(plan.primitives, "looking for superfluous steps"):
         for situation, key, value in (
             rules.changes(problem.domain.behaviors[step.behavior], step.arguments, facts) or ()
         ):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -48,6 +48,7 @@ from confab.progress import progress
 from confab.reasoner.files import check_folder
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.kinds import EPISODE, FILM, MEMORY, OBSERVED, PICTURE, PLAN, REPORT, VERDICTS
+from confab.reasoner.limits import LimitError, within
 from confab.terminal import EXIT, GAVE_UP, NO, YES, limited, remark, show_result, told
 
 if TYPE_CHECKING:
@@ -141,8 +142,9 @@ def plan(
     else:
         # The library rich, whose import takes time, prints only plans: without a plan, the time limit may be over.
         show_result(result.json() if as_json else result if result.solved else str(result))
-    if dearer := result.dearer():
-        remark(dearer)
+    with suppress(LimitError), within(deadline):
+        if dearer := result.dearer():
+            remark(dearer)
     warn_of_errors(loaded, deadline)
     blame_reach(loaded, result.outcome, deadline)
     raise Exit(EXIT[result.outcome.status.value])
