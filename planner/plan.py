@@ -454,7 +454,8 @@ class UngroundableError(Exception):
 def paused_collection() -> Iterator[None]:
     """Pause the garbage collector of Python while the context is active.
 
-    Reading and planning create no reference cycles, and garbage collection would take a third of their time.
+    Reading and planning create no reference cycles, and garbage collection would take a third of their time. Therefore the new
+    objects also count as old afterwards; otherwise the next collection would examine all of them.
     """
     enabled = gc.isenabled()
     gc.disable()
@@ -462,6 +463,8 @@ def paused_collection() -> Iterator[None]:
         yield
     finally:
         if enabled:
+            gc.freeze()
+            gc.unfreeze()  # into the oldest generation
             gc.enable()
 
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 import glob
 import logging
 import os
+import sys
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
+from click.exceptions import Exit
 
 from confab import ontology
 from confab.commands.given import FACT, IRI
@@ -123,6 +125,9 @@ class Command(click.Command):
             if any(_is_no_scene(each, ctx.params.get(each.name or "")) for each in self.params):
                 raise KnowledgeError("wanted a scene")
             return super().invoke(ctx)
+        except Exit as end:  # click would free all data of the command, which takes seconds for a large scene
+            sys.stdout.flush()
+            raise SystemExit(end.exit_code) from end
         except KnowledgeError as error:
             from confab.commands.misplaced import correction
 
