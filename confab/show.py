@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,6 +19,8 @@ STYLES = ("bold cyan", "green", "default")
 Notes = Mapping[tuple[int, ...], str]
 """Remarks on steps, such as verdicts, by the step's path."""
 
+FORCING = {"FORCE_COLOR", "TTY_COMPATIBLE"}
+"""Environment variables that let rich treat any output as a terminal."""
 CONTROL = dict.fromkeys((7, 8, 11, 12, 13))
 """Control characters that a terminal would execute, for `str.translate`."""
 UNLIMITED = 100_000
@@ -34,7 +37,7 @@ def page() -> Console:
 def show(what: Any) -> None:
     """Print an object that the library rich can show, to stdout; lines are wrapped only in a terminal."""
     shown = what.__rich__() if hasattr(type(what), "__rich__") else what
-    if isinstance(shown, PlanTree) and not sys.stdout.isatty():
+    if isinstance(shown, PlanTree) and not sys.stdout.isatty() and FORCING.isdisjoint(os.environ):
         sys.stdout.writelines(shown.lines())
         return
     console = page()
