@@ -65,8 +65,8 @@ def main() -> None:
     if "problems" in kinds:
         _problems()
     if "worlds" in kinds:
-        _worlds(limited=False)
-        _worlds(limited=True)
+        for kind in ("", "limited", "shared"):
+            _worlds(kind)
     if "families" in kinds:
         _families()
 
@@ -240,8 +240,11 @@ def validated(domain: Path, problem: Path, steps: Sequence[tuple[Fraction, str, 
     return bool(validator.validate(read, TimeTriggeredPlan(timed)))
 
 
-def _worlds(limited: bool) -> None:
-    """Print how plans of random timed worlds, with deadlines and windows if `limited`, compare with an exhaustive search."""
+def _worlds(kind: str) -> None:
+    """Print how plans of random timed worlds compare with an exhaustive search.
+
+    The worlds have deadlines and windows if `kind` is ``limited``, and an amount that actions share if it is ``shared``.
+    """
     from confab.planner.plan import Limits, Status
     from confab.planner.solve import Request, solve
     from confab.planner.timed.call import best_in_time
@@ -254,7 +257,7 @@ def _worlds(limited: bool) -> None:
     wrong: list[int] = []
     began = process_time()
     for seed in range(first, first + count):
-        world = timed_world(seed, limited=limited)
+        world = timed_world(seed, limited=kind == "limited", shared=kind == "shared")
         problem = problem_of(world)
         outcome = solve(Request(problem, limits=Limits(seconds=20.0)))
         timed = schedule_of(outcome)
@@ -276,8 +279,10 @@ def _worlds(limited: bool) -> None:
             found["solved"] += 1
             found["of these with the least makespan"] += timed.makespan == least
             ratios.append(float(timed.makespan / least))
-    what = "Random timed worlds with deadlines and windows" if limited else "Random timed worlds"
-    print(f"\n{what} {first} to {first + count - 1}, {process_time() - began:.0f} CPU s:\n\n| | |\n|---|---|")
+    what = {"": "", "limited": " with deadlines and windows", "shared": " with a shared amount"}[kind]
+    print(
+        f"\nRandom timed worlds{what}, {first} to {first + count - 1}, {process_time() - began:.0f} CPU s:\n\n| | |\n|---|---|"
+    )
     for name, many in sorted(found.items()):
         print(f"| {name} | {many} |")
     print(f"| makespan ÷ least, mean | {sum(ratios) / max(len(ratios), 1):.3f} |")

@@ -17,13 +17,17 @@ from random import Random
 from confab.planner.timed.plan import TimedPlan
 from confab.reasoner.aggregates.compiling import compiled
 from confab.reasoner.aggregates.totals import with_totals
-from confab.reasoner.amounts import Quantity
+from confab.reasoner.amounts import Amount, Quantity
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     Aggregate,
+    AmountEffect,
     Behavior,
+    Comparison,
+    Condition,
     Domain,
+    Effect,
     Parameter,
     Problem,
     SituationType,
@@ -36,6 +40,7 @@ from confab.reasoner.symbols import (
 )
 from confab.reasoner.timing import projected
 
+LEVEL, NO_LIMIT = 1_000, 100
 MOST_STATES = 20_000
 """Maximum number of states of an exhaustive search; a larger world is drawn again."""
 SPANS = {"start": Span.START, "throughout": Span.THROUGHOUT, "end": Span.END}
@@ -45,12 +50,17 @@ Literal = tuple[int, bool]
 
 @dataclass(frozen=True)
 class Action:
-    """The conditions and effects of an action: facts with their values, at its start, throughout and at its end."""
+    """The conditions and effects of an action: facts with their values, at its start, throughout and at its end.
+
+    `adds` changes the level of the world at the start or end; `limits` are the least and the greatest level before the change.
+    """
 
     seconds: int
     actor: int | None
     asks: tuple[tuple[str, Literal], ...]
     makes: tuple[tuple[str, Literal], ...]
+    adds: tuple[tuple[str, int], ...] = ()
+    limits: tuple[tuple[str, int, int], ...] = ()
 
     def at(self, span: str, of: str = "asks") -> list[Literal]:
         """Return the conditions or effects in a span."""
@@ -61,7 +71,8 @@ class Action:
 class TimedWorld:
     """Actions, initial facts, goal literals, literals that may never hold together, deadlines of goals, and windows of actors.
 
-    A deadline is a goal's fact and a time; a window is an actor and two times.
+    A deadline is a goal's fact and a time; a window is an actor and two times. A state with the level n has the fact `LEVEL` + n;
+    `levels` are the least and the greatest level.
     """
 
     facts: int
@@ -71,6 +82,7 @@ class TimedWorld:
     never: tuple[Literal, ...] = ()
     deadlines: tuple[tuple[int, int], ...] = ()
     windows: tuple[tuple[int, int, int], ...] = ()
+    levels: tuple[int, int] | None = None
 
     @property
     def last(self) -> int:
@@ -94,10 +106,11 @@ Running = tuple[int, int]
 State = tuple[frozenset[int], frozenset[Running]]
 
 
-def timed_world(seed: int, constrained: bool = False, limited: bool = False) -> TimedWorld:
+def timed_world(seed: int, constrained: bool = False, limited: bool = False, shared: bool = False) -> TimedWorld:
     """Return the random world of a seed.
 
-    With `constrained`, two literals may never hold together; with `limited`, the world has deadlines and windows.
+    With `constrained`, two literals may never hold together; with `limited`, the world has deadlines and windows; with `shared`,
+    actions take and give units of a shared amount.
     """
     rng = Random(seed)
     while True:
@@ -110,8 +123,43 @@ def timed_world(seed: int, constrained: bool = False, limited: bool = False) -> 
             lows = [(actor, rng.randint(0, 3)) for actor in (0, 1) if rng.random() < 0.6]
             windows = tuple((actor, low, low + rng.randint(2, 8)) for actor, low in lows)
             world = replace(world, deadlines=deadlines, windows=windows)
+        if shared:
+            first, levels = rng.randint(1, 3), (rng.choice((-NO_LIMIT, 0)), rng.choice((3, 4, NO_LIMIT)))
+            actions = tuple(_sharing(rng, one) for one in world.actions)
+            initial = world.initial | {LEVEL + first}
+            world = replace(world, actions=actions, initial=initial, levels=levels)
         if not _hold(world.initial, list(world.goal)) and not _violated(world, world.initial):
             return world
+
+
+def _sharing(rng: Random, action: Action) -> Action:
+    """Return an action that borrows, takes, gives, or only requires units of the shared amount."""
+    units, kind = rng.randint(1, 2), rng.choice(("borrow", "borrow", "borrow", "take", "give", "fill", "need", "none"))
+    needs = ("start", units, NO_LIMIT)
+    if kind == "borrow":
+        return replace(action, actor=None, adds=(("start", -units), ("end", units)), limits=(needs,))
+    if kind == "take":
+        return replace(
+            action, adds=((rng.choice(("start", "end")), -units),), limits=(needs,) if rng.random() < 0.7 else ()
+        )
+    if kind == "give":
+        return replace(action, adds=((rng.choice(("start", "end")), units),), limits=())
+    if kind == "fill":
+        return replace(
+            action, actor=None, adds=(("start", units), ("end", -units)), limits=(("start", -NO_LIMIT, 3 - units),)
+        )
+    return replace(action, limits=((rng.choice(("start", "end")), units, NO_LIMIT),)) if kind == "need" else action
+
+
+def _counted(world: TimedWorld, facts: frozenset[int], action: Action, span: str) -> frozenset[int] | None:
+    """Return the facts after an action has changed the level at its start or end, or None if this exceeds a limit."""
+    if world.levels is None:
+        return facts
+    (level,) = (fact - LEVEL for fact in facts if fact >= LEVEL // 2)
+    if not all(least <= level <= most for at, least, most in action.limits if at == span):
+        return None
+    after = level + sum(change for at, change in action.adds if at == span)
+    return (facts - {LEVEL + level}) | {LEVEL + after} if world.levels[0] <= after <= world.levels[1] else None
 
 
 def _violated(world: TimedWorld, facts: frozenset[int]) -> bool:
@@ -204,7 +252,10 @@ def _begun(world: TimedWorld, facts: frozenset[int], running: frozenset[Running]
         return None
     if not _hold(facts, asked):
         return None
-    after = _made(facts, begun)
+    counted = _counted(world, facts, action, "start")
+    if counted is None:
+        return None
+    after = _made(counted, begun)
     if not _hold(after, held) or not _kept(world, after, running) or _violated(world, after):
         return None
     return after, running | {(number, action.seconds)}
@@ -222,7 +273,10 @@ def _passed(
         asked, made = action.at("end"), action.at("end", "makes")
         if _taken(world, left, [*asked, *made]) or not _hold(facts, asked):
             return None
-        facts = _made(facts, made)
+        counted = _counted(world, facts, action, "end")
+        if counted is None:
+            return None
+        facts = _made(counted, made)
         if not _kept(world, facts, left) or _violated(world, facts):
             return None
     return facts, left
@@ -254,7 +308,7 @@ def problem_of(world: TimedWorld) -> Problem:
     situations = {f"F{i}": SituationType(f"F{i}", ("Thing",), "Truth", boolean=True) for i in range(world.facts)}
     behaviors = {}
     for number, action in enumerate(world.actions):
-        asked = tuple(
+        asked: tuple[tuple[Span, Condition], ...] = tuple(
             (SPANS[span], ValueCondition(f"F{fact}", ("it",), TRUE if value else FALSE))
             for span, (fact, value) in action.asks
         )
@@ -262,7 +316,20 @@ def problem_of(world: TimedWorld) -> Problem:
             (SPANS[span], ValueEffect(f"F{fact}", ("it",), TRUE if value else FALSE))
             for span, (fact, value) in action.makes
         )
-        conditions, effects = projected(asked, made)
+        asked += tuple(
+            (SPANS[span], Comparison(Amount("N", ()), operator, Fraction(number)))
+            for span, least, most in action.limits
+            for operator, number in ((">=", least), ("<=", most))
+            if abs(number) < NO_LIMIT
+        )
+        every: tuple[tuple[Span, Effect], ...] = (
+            *made,
+            *(
+                (SPANS[span], AmountEffect("N", (), "increase" if change > 0 else "decrease", Fraction(abs(change))))
+                for span, change in action.adds
+            ),
+        )
+        conditions, effects = projected(asked, every)
         actors = () if action.actor is None else (f"actor{action.actor}",)
         behaviors[f"A{number}"] = Behavior(
             f"A{number}",
@@ -271,10 +338,15 @@ def problem_of(world: TimedWorld) -> Problem:
             (),
             conditions,
             tuple(e for e in effects if isinstance(e, ValueEffect)),
-            timing=Timing(Fraction(action.seconds), actors, asked, made),
+            amounts=tuple(e for e in effects if isinstance(e, AmountEffect)),
+            timing=Timing(Fraction(action.seconds), actors, asked, every),
         )
     classes = {"Thing": ("it",), "Actor0": ("actor0",), "Actor1": ("actor1",)}
-    initial = {Symbol(f"F{fact}", ("it",)): TRUE for fact in sorted(world.initial)}
+    initial = {Symbol(f"F{fact}", ("it",)): TRUE for fact in sorted(world.initial) if fact < LEVEL // 2}
+    if world.levels is not None:
+        least, most = (None if abs(one) == NO_LIMIT else Fraction(one) for one in world.levels)
+        situations["N"] = SituationType("N", (), "N", quantity=Quantity(least=least, most=most))
+        initial |= {Symbol("N", ()): str(fact - LEVEL) for fact in world.initial if fact >= LEVEL // 2}
     goal = {Symbol(f"F{fact}", ("it",)): TRUE if value else FALSE for fact, value in sorted(world.goal)}
     domain = Domain(situations, behaviors)
     if world.never:

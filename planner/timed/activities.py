@@ -7,7 +7,7 @@ sequence is simulated once on symbols, and the simulation records the facts that
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from fractions import Fraction
 from typing import TypeAlias
@@ -15,9 +15,11 @@ from typing import TypeAlias
 from confab.planner.checked_conditions import Arguments
 from confab.planner.plan import Step
 from confab.planner.timed.pieces import Pieces, actors_of, default_actors, duration_of, pieces_of, terms_at
+from confab.planner.timed.pools import AmountUse, counts_of
 from confab.planner.validation import BehaviorReader, Cell, LoggedState
 from confab.reasoner.limits import check
 from confab.reasoner.symbols import Behavior, Problem, State, Symbol, Times
+from confab.reasoner.timing import judged_by_events
 
 ReadAccess: TypeAlias = "tuple[str, object]"
 """A read access: the value of a symbol (situation type and arguments), or all symbols of a situation type with a given value."""
@@ -43,11 +45,13 @@ class InapplicableError(Exception):
 class Access:
     """The facts that a step reads and the symbols that the step changes, at one moment or throughout its duration.
 
-    `writes` maps each changed symbol to the old and the new value.
+    `writes` maps each changed symbol to the old and the new value. `counts` contains the amounts that the step only increases,
+    decreases, or compares with fixed numbers.
     """
 
     reads: frozenset[ReadAccess] = frozenset()
     writes: Mapping[Cell, tuple[str, str]] | None = None
+    counts: Mapping[Cell, AmountUse] = field(default_factory=dict)
 
     @property
     def changes(self) -> Mapping[Cell, tuple[str, str]]:
@@ -147,6 +151,9 @@ class StepSimulation:
         self.made: list[dict[str, Access]] = [{} for _ in steps]
         self.terms: dict[int, Arguments] = {}
         self.seconds: dict[int, Fraction] = {}
+        by_events = judged_by_events(problem) and any(one.quantity for one in problem.domain.situations.values())
+        behaviors = problem.domain.behaviors.values()
+        self.changing = frozenset[str]().union(*(one.changes for one in behaviors)) if by_events else None
 
     def piece(self, number: int) -> Pieces:
         """Return the pieces of a step's behaviour."""
@@ -162,17 +169,21 @@ class StepSimulation:
         """
         step, pieces = self.steps[number], self.piece(number)
         terms = self.terms[number] = terms_at(self.rules, pieces, step.arguments, self.facts)
+        self.facts.begin()
         seconds = duration_of(self.problem, pieces.whole, terms, self.facts)
         if seconds is None:
             raise InapplicableError(
                 f"{step} has no duration in its state: the calculation gives no number of 0 or more"
             )
         self.seconds[number] = seconds
+        lasting = self.facts.noted()
         begin = self.done(step, pieces.begin, terms, True)
         middle = self.done(step, pieces.middle, terms, False)
         asked = self.done(step, pieces.held, terms, False).reads
-        self.made[number]["begin"] = replace(begin, reads=begin.reads | middle.reads - asked)
-        self.made[number]["middle"] = replace(middle, reads=asked)
+        read = lasting | (middle.reads - asked)
+        counts = {cell: count for cell, count in begin.counts.items() if cell not in read}
+        self.made[number]["begin"] = replace(begin, reads=begin.reads | read, counts=counts)
+        self.made[number]["middle"] = replace(middle, reads=asked, counts={})
 
     def end(self, number: int) -> None:
         """End a step: make the stored effects, test the conditions of its end, and make the effects of its end."""
@@ -215,7 +226,9 @@ class StepSimulation:
         if put:
             for cell, (_, value) in writes.items():
                 facts.put(*cell, value)
-        return Access(reads, writes)
+        if self.changing is None:
+            return Access(reads, writes)
+        return Access(reads, writes, counts_of(piece, terms, writes, self.changing))
 
     def found(self) -> list[Activity]:
         """Return the activities of all steps."""

@@ -244,7 +244,7 @@ def timed_plan(
     """
     renamed = renamed_by(order, found.turns)
     durations = durations_with(network, choices, found.turns)
-    edges = (*network.edges, *turn_edges(order, found.turns))
+    edges = (*network.edges, *turn_edges(order, found.turns, network.separation > 0))
     arcs = network.arcs(edges, durations)
     slack = _slack(network, arcs, durations, found.begins)
     new = exchanged(problem, plan, renamed) if renamed else plan

@@ -1,8 +1,8 @@
 """Shorter schedules and lower bounds, computed by the constraint solver CP-SAT of OR-Tools (the extra `time`).
 
 In the model of the solver, the turns of a resource are intervals that don't overlap. A turn that several actors could take has an
-optional interval on each of these actors; exactly one of the intervals is present. The solver chooses the order of the turns and
-the actor of each turn. The earliest begins of the activities follow from these choices.
+optional interval on each of these actors; exactly one of the intervals is present. A pool is a reservoir. The solver chooses the
+order of the turns and the actor of each turn. The earliest begins of the activities follow from these choices.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from confab.planner.timed.network import ALWAYS, Network, earliest
-from confab.planner.timed.order import BEGIN, END, Order, TurnId
+from confab.planner.timed.order import BEGIN, END, Order, Resource, TurnId
 from confab.planner.timed.schedules import ActorChoices, CandidateSchedule, durations_with, turn_edges
 
 WORK = 1.0
@@ -57,7 +57,8 @@ def shorter(
     if status not in (cp_model.OPTIMAL, cp_model.FEASIBLE):
         return found, bound if status == cp_model.INFEASIBLE else best
     turns = made.turns(solver)
-    begins = earliest(network, turn_edges(order, turns), durations_with(network, choices, turns))
+    edges = turn_edges(order, turns, network.separation > 0)
+    begins = earliest(network, edges, durations_with(network, choices, turns))
     if begins is None or begins.cost >= found.begins.cost:
         return found, min(best, found.makespan)
     return CandidateSchedule(turns, begins), min(best, begins.makespan)
@@ -122,6 +123,9 @@ class _ScheduleModel:
         model, apart = self.model, self.network.separation
         takes: list[list[tuple[Any, int]]] = [[] for _ in self.order.resources]
         for resource, one in enumerate(self.order.resources):
+            if one.pool is not None:
+                self.pool(resource, one)
+                continue
             readers = sum(turn.reading for turn in one.turns)
             for number, turn in enumerate(one.turns):
                 key = (resource, number)
@@ -154,10 +158,30 @@ class _ScheduleModel:
             elif intervals and not all(turn.reading for turn in self.order.resources[resource].turns):
                 model.AddNoOverlap([i for i, _ in intervals])
 
+    def pool(self, resource: int, one: Resource) -> None:
+        """Add the limits of a pool as a reservoir, and the minimum time between its events."""
+        assert one.pool is not None
+        times = [
+            self.begins[i] + (self.lasts[i] if which == END else 0) for ((i, which),) in (t.lows for t in one.turns)
+        ]
+        self.begin_of |= {(resource, number): time for number, time in enumerate(times)}
+        changes, most = one.pool.changes, sum(map(abs, one.pool.changes))
+        low, high = (most if side is None else side.stock for side in (one.pool.lower, one.pool.upper))
+        self.model.AddReservoirConstraint(times, changes, -low, high)
+        if apart := self.network.separation:
+            self.model.AddNoOverlap([self.model.NewFixedSizeIntervalVar(time, apart, "") for time in times])
+
     def turns(self, solver: Any) -> list[list[TurnId]]:
         """Return the turns of each resource in the order of the solver's solution."""
         found: list[list[TurnId]] = [[] for _ in self.order.resources]
-        for key in sorted(self.begin_of, key=lambda one: (solver.Value(self.begin_of[one]), one)):
+        gives = {
+            (r, t)
+            for r, one in enumerate(self.order.resources)
+            if one.pool
+            for t, c in enumerate(one.pool.changes)
+            if c > 0
+        }
+        for key in sorted(self.begin_of, key=lambda one: (solver.Value(self.begin_of[one]), one not in gives, one)):
             able = self.choices.of.get(key, (key[0],))
             taken = [t for t in able if len(able) == 1 or solver.Value(self.present[key, t])]
             found[taken[0]].append(key)

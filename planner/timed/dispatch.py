@@ -80,7 +80,7 @@ class Dispatch:
         self.order = order_of(problem, activities(problem, steps, events), events)
         self.network = network_of(self.order, more=(UNIT,))
         self.turns = self.order.turns
-        every = [*self.network.edges, *turn_edges(self.order, self.turns)]
+        every = [*self.network.edges, *turn_edges(self.order, self.turns, self.network.separation > 0)]
         self.controlled = all(low == BEGIN for *_, low in every)
         fixed = same_actors or not self.controlled
         self.choices = ActorChoices() if fixed else choices_of(problem, timed.plan, self.order, self.network)
@@ -178,7 +178,9 @@ class Dispatch:
     def _settle(self) -> None:
         """Compute the durations, and the edges into and out of each primitive, from the order of the turns of each resource."""
         self.lasts = durations_with(self.network, self.choices, self.turns)
-        self.edges = [*dict.fromkeys((*self.network.edges, *turn_edges(self.order, self.turns)))]
+        self.edges = [
+            *dict.fromkeys((*self.network.edges, *turn_edges(self.order, self.turns, self.network.separation > 0)))
+        ]
         self.into: dict[int, list[Edge]] = defaultdict(list)
         self.out_of: dict[int, list[Edge]] = defaultdict(list)
         for edge in self.edges:

@@ -73,7 +73,7 @@ class Listing:
         self.order, self.network, self.of, self.lasts = order, network, of, lasts
         self.turns_of: list[list[TurnId]] = [[] for _ in order.activities]
         for resource, its in enumerate(order.resources):
-            for number, turn in enumerate(its.turns):
+            for number, turn in enumerate(its.turns if its.pool is None else ()):
                 for member in turn.members:
                     self.turns_of[member].append((resource, number))
         self.into: dict[int, list[Edge]] = defaultdict(list)
@@ -101,10 +101,21 @@ class Listing:
             self.start()
             occupied = self.listed(blocks, graph, tails)
             if not occupied:
-                return [line.taken for line in self.lines]
+                return [self.line(resource) for resource in range(len(self.lines))]
             if occupied <= self.kept:
                 return None
             self.kept |= occupied
+
+    def line(self, resource: int) -> list[TurnId]:
+        """Return the turns of a resource in their order; the events of a pool have the order of their times."""
+        its = self.order.resources[resource]
+        if its.pool is None:
+            return self.lines[resource].taken
+        times = [
+            (self.begins[i] + which * self.durations[i], -which, self.begins[i])
+            for ((i, which),) in (t.lows for t in its.turns)
+        ]
+        return [(resource, number) for number in sorted(range(len(times)), key=times.__getitem__)]
 
     def listed(self, blocks: Sequence[Sequence[int]], graph: networkx.DiGraph[int], tails: Sequence[int]) -> set[int]:
         """Append all blocks, and return the occupied resources that exclude the remaining blocks."""

@@ -14,15 +14,16 @@ Siddiqui and Haslum, "Block-structured plan deordering", AI 2012.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import pairwise
 
 from confab.planner.timed.activities import Activity, EventKind, InapplicableError, ReadAccess, StepEvent
+from confab.planner.timed.pools import AmountPool, AmountUse, pool_of
 from confab.planner.validation import Cell
 from confab.reasoner.limits import check
-from confab.reasoner.symbols import Problem, Times
+from confab.reasoner.symbols import Problem, Symbol, Times
 
 BEGIN, END = 0, 1
 Edge = tuple[int, int, int, int]
@@ -48,12 +49,14 @@ class Turn:
 class Resource:
     """A symbol, a looked-up set of symbols with a value, or an actor, with turns that exclude each other, as in the sequence.
 
-    `actor` is the name of the actor, or None; `value` is the value of a set of symbols, or None.
+    `actor` is the name of the actor, or None; `value` is the value of a set of symbols, or None. The turns of a `pool` are events,
+    which don't exclude each other.
     """
 
     turns: tuple[Turn, ...]
     actor: str | None = None
     value: str | None = None
+    pool: AmountPool | None = None
 
 
 @dataclass(frozen=True)
@@ -109,7 +112,9 @@ def order_of(problem: Problem, activities: Sequence[Activity], events: Iterable[
     InapplicableError
         An activity changes a fact that another, unfinished activity requires throughout.
     """
-    records, touched, starts, ends = _records(activities, events)
+    events = list(events)
+    pools = _pools(problem, activities, events)
+    records, touched, starts, ends = _records(activities, events, pools)
     times = problem.times or Times()
     fixed = {(s.situation, s.arguments) for s in times.deadlines}
     returning = {cell for cell in records if cell not in fixed and _returns(records[cell])}
@@ -124,6 +129,7 @@ def order_of(problem: Problem, activities: Sequence[Activity], events: Iterable[
     for one, groups in [*((cell, [records[cell]]) for cell in loose), *free.items()]:
         own[one] = len(resources)
         resources.append(Resource(_turns(groups, ends), value=one[1] if isinstance(one[1], str) else None))
+    resources += pools.values()
     turn_of = [{m: t for t, turn in enumerate(r.turns) for m in turn.members} for r in resources]
     edges = dict[Edge, None]()
     for cell, found in records.items():
@@ -151,10 +157,36 @@ def order_of(problem: Problem, activities: Sequence[Activity], events: Iterable[
     )
 
 
+def _pools(problem: Problem, activities: Sequence[Activity], events: Sequence[StepEvent]) -> dict[Cell, Resource]:
+    """Return the amounts that all activities only increase, decrease or compare with fixed numbers, as resources."""
+    found: dict[Cell, list[tuple[int, int, AmountUse]]] = defaultdict(list)
+    for number, moment in events:
+        one = activities[number]
+        for access, which, other in ((one.begin, BEGIN, EventKind.END), (one.end, END, EventKind.BEGIN)):
+            for cell, count in access.counts.items() if moment is not other else ():
+                found[cell].append((number, which, count))
+    unfit = {(symbol.situation, symbol.arguments) for symbol in (problem.times or Times()).deadlines}
+    for one in activities if found else ():
+        unfit.update(*((access.reads | access.changes.keys()) - access.counts.keys() for access in one.accesses))  # type: ignore[arg-type]
+    pools = dict[Cell, Resource]()
+    for cell, its in found.items():
+        symbol, quantity = Symbol(*cell), problem.domain.situations[cell[0]].quantity
+        if cell in unfit or quantity is None or symbol not in problem.initial or not any(c.change for *_, c in its):
+            continue
+        pool = pool_of([count for *_, count in its], Fraction(problem.initial[symbol]), quantity)
+        if pool is not None:
+            turns = tuple(Turn((number,), ((number, which),), ((number, which),)) for number, which, _ in its)
+            pools[cell] = Resource(turns, pool=pool)
+    return pools
+
+
 def _records(
-    activities: Sequence[Activity], events: Iterable[StepEvent]
+    activities: Sequence[Activity], events: Iterable[StepEvent], pools: Container[Cell]
 ) -> tuple[dict[Cell, list[_TimedAccess]], dict[ReadAccess, list[_TimedAccess]], dict[int, int], dict[int, int]]:
-    """Return the accesses to each symbol, the look-ups of the symbols with each value, and the positions of begins and of ends."""
+    """Return the accesses to each symbol, the look-ups of the symbols with each value, and the positions of begins and of ends.
+
+    Accesses to `pools` are left out.
+    """
     cells: dict[Cell, list[_TimedAccess]] = defaultdict(list)
     values: dict[ReadAccess, list[_TimedAccess]] = defaultdict(list)
     starts: dict[int, int] = {}
@@ -174,10 +206,11 @@ def _records(
             for key in access.reads:
                 if isinstance(key[1], str):
                     values[key].append(_TimedAccess(number, low, high, None, at))
-                elif key not in access.changes:
+                elif key not in access.changes and key not in pools:
                     cells[key].append(_TimedAccess(number, low, high, None, at))  # type: ignore[index]
             for cell, pair in access.changes.items():
-                cells[cell].append(_TimedAccess(number, low, high, pair, at))
+                if cell not in pools:
+                    cells[cell].append(_TimedAccess(number, low, high, pair, at))
         position += 1
     return cells, values, starts, ends
 

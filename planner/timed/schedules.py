@@ -16,7 +16,7 @@ from time import perf_counter
 
 from confab.planner.timed.listing import Listing
 from confab.planner.timed.network import Begins, Network, earliest
-from confab.planner.timed.order import BEGIN, END, Edge, Order, Turn, TurnId
+from confab.planner.timed.order import BEGIN, END, Edge, Order, Resource, Turn, TurnId
 
 ROUNDS = 100
 """Maximum number of exchanges of turns without a better schedule."""
@@ -118,9 +118,21 @@ def rescheduled(
     return None if start is None else search.improved(start, inf, 0)
 
 
-def turn_edges(order: Order, turns: Sequence[Sequence[TurnId]]) -> Iterator[Edge]:
-    """Yield the edges that order the turns of each resource; turns that only read a symbol may overlap."""
-    for line in turns:
+def turn_edges(order: Order, turns: Sequence[Sequence[TurnId]], apart: bool = False) -> Iterator[Edge]:
+    """Yield the edges that order the turns of each resource; turns that only read a symbol may overlap.
+
+    Events of a pool are ordered if one of them takes what another one gives, or all of them if `apart` is true.
+    """
+    for one, line in zip(order.resources, turns, strict=True):
+        if one.pool is not None:
+            numbers = [number for _, number in line]
+            for before, after in (*one.pool.pairs(numbers), *(pairwise(numbers) if apart else ())):
+                (high,), (low,) = one.turns[before].highs, one.turns[after].lows
+                if before == after:
+                    yield high[0], END, low[0], BEGIN  # no event takes what it gives itself
+                elif high[0] != low[0] or high[1] == END:
+                    yield (*high, *low)
+            continue
         last: Turn | None = None
         readers: list[Turn] = []
         for resource, number in line:
@@ -171,7 +183,8 @@ class _ScheduleSearch:
 
     def begins(self, turns: list[list[TurnId]], network: Network, choices: ActorChoices) -> Begins | None:
         """Return the earliest begins for an order of turns, or None if the order has no schedule."""
-        return earliest(network, turn_edges(self.order, turns), durations_with(network, choices, turns))
+        edges = turn_edges(self.order, turns, network.separation > 0)
+        return earliest(network, edges, durations_with(network, choices, turns))
 
     def starts(self) -> Iterator[list[list[TurnId]]]:
         """Yield the orders of turns that lead to the first schedules: the order of the sequence, and list scheduling."""
@@ -274,8 +287,8 @@ class _ScheduleSearch:
 def least(order: Order, network: Network, choices: ActorChoices) -> int:
     """Return a lower bound on the makespan of any schedule of the activities with any possible actors.
 
-    The bound is the greater of two numbers: the longest chain of precedences, and the work that only some actors can do divided by
-    the number of these actors.
+    The bound is the greatest of three numbers: the longest chain of precedences, the work that only some actors can do divided by
+    the number of these actors, and the work that uses a pool divided by its stock.
     """
     lasts = list(network.durations)
     for its in choices.lasts.values():
@@ -290,12 +303,32 @@ def least(order: Order, network: Network, choices: ActorChoices) -> int:
     work: dict[frozenset[int], int] = defaultdict(int)
     for turn in chain.from_iterable(order.turns):
         work[frozenset(choices.of.get(turn, turn[:1]))] += _work(order, lasts, turn)
+    bound = max([bound, *(_shared_work(order, lasts, one) for one in order.resources)])
     unions = list(work)
     for able in unions:  # the loop appends unions to the list
         bound = max(bound, -(-sum(its for other, its in work.items() if other <= able) // len(able)))
         more = dict.fromkeys(able | other for other in work if len(able) > 1 < len(other) and able & other)
         unions += [one for one in more if one not in unions][: max(MOST_UNIONS - len(unions), 0)]
     return bound
+
+
+def _shared_work(order: Order, lasts: Sequence[int], resource: Resource) -> int:
+    """Return the work of the activities that take units of a pool at their begin, divided by the stock.
+
+    Return 0 if some activities give more units than they have taken, or keep units.
+    """
+    bounds = [0]
+    for side in () if resource.pool is None else filter(None, (resource.pool.lower, resource.pool.upper)):
+        taken, work = dict[int, int](), 0
+        for turn, takes, gives in zip(resource.turns, side.takes, side.gives, strict=True):
+            ((i, which),) = turn.lows
+            if which == BEGIN and not gives:
+                taken[i], work = takes, work + takes * lasts[i]
+            elif which == BEGIN or gives - takes > taken.pop(i, 0):
+                break
+        else:
+            bounds.append(-(-work // side.stock) if side.stock and not any(taken.values()) else 0)
+    return max(bounds)
 
 
 def _work(order: Order, lasts: Sequence[int], turn: TurnId) -> int:
@@ -306,6 +339,8 @@ def _work(order: Order, lasts: Sequence[int], turn: TurnId) -> int:
     """
     resource = order.resources[turn[0]]
     its = resource.turns[turn[1]]
+    if resource.pool is not None:
+        return 0
     if resource.actor is not None:
         return sum(lasts[m] for m in its.members if resource.actor in order.activities[m].actors)
     whole = [m for m in its.members if (m, BEGIN) in its.lows and (m, END) in its.highs]

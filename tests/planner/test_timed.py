@@ -247,6 +247,10 @@ def test_plans_of_random_worlds_with_windows_and_deadlines_keep_them() -> None:
     assert {seed: told for seed in range(9_000, 9_080) if (told := wrong(timed_world(seed, limited=True)))} == {}
 
 
+def test_plans_of_random_worlds_whose_actions_share_an_amount_never_exceed_it() -> None:
+    assert {seed: told for seed in range(10_000, 10_080) if (told := wrong(timed_world(seed, shared=True)))} == {}
+
+
 def test_a_deadline_bounds_the_begin_of_a_step_that_achieves_its_goal_at_the_start() -> None:
     world = TimedWorld(1, (Action(4, 0, (), (("start", (0, True)),)),), frozenset(), ((0, True),), (), ((0, 1),))
     _, timed = planned(problem_of(world))
