@@ -8,9 +8,9 @@
     CONFAB_KINDS=worlds CONFAB_COUNT=1000 …              the random worlds only
     CONFAB_KINDS=families CONFAB_SIZES=10,40 …           the families only, with these numbers of objects
 
-Each run is a separate process, limited to 30 s of CPU time. LPG improves its plan until the limit. If Confab's own search finds no
-plan in sequence, an installed engine of unified-planning searches for one in the rest of the time, as in `confab plan`. Plans of
-Confab are judged by unified-planning's TimeTriggeredPlanValidator, with conflicting events 1 ms apart.
+Each run is a separate process, limited to 30 s of CPU time. LPG improves its plan until the limit. Confab plans as the command
+`confab plan --minimise makespan` does. Its plans are judged by unified-planning's TimeTriggeredPlanValidator, with conflicting
+events 1 ms apart.
 """
 
 from __future__ import annotations
@@ -25,15 +25,14 @@ from collections.abc import Sequence
 from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from time import process_time
 
 from benchmarks._processes import seconds_of_children
 
-SECONDS, VALIDATING = 30, 5
+SECONDS, SPACING, VALIDATING = 30, 2, 5
 ROOT = Path(__file__).resolve().parents[1]
 PROBLEMS = Path(os.environ.get("CONFAB_TEMPORAL", ROOT.parent / "shared" / "temporal"))
-OWN = 0.3
-"""Share of the time for Confab's own search in sequence; if it finds no plan, an installed engine searches."""
 EPSILON = Fraction(1, 1000)
 FIRST, COUNT = 20_000, 5_000
 TABLES = ("served", "swap", "handover", "blocked")
@@ -175,30 +174,33 @@ def _said(done: subprocess.CompletedProcess[str]) -> dict[str, float | bool] | N
 
 
 def one(domain: Path, problem: Path) -> None:
-    """Print the makespan of Confab's plan for one problem, and whether the validator accepts the plan."""
-    from confab.engines import plan_by_engine
-    from confab.planner.plan import Limits
-    from confab.planner.solve import Request, solve
-    from confab.planner.timed import concurrent
-    from confab.planner.timed.call import best_in_time
-    from confab.reasoner.graph.knowledge import KnowledgeError
+    """Print the makespan of Confab's plan for one problem, and whether the validator accepts the plan.
+
+    The plan is that of ``confab import`` and ``confab plan --minimise makespan``, which allow conflicting events at the same time.
+    Its events are then scheduled again in their order, `EPSILON` apart.
+    """
+    import confab
+    from confab.planner.timed.activities import EventKind
+    from confab.planner.timed.call import in_time
     from confab.reasoner.pddl.importing import imported
     from confab.reasoner.pddl.syntax import parse_files
-    from confab.reasoner.timing import only_during
+    from confab.reasoner.pddl.turtle import turtle
 
-    def used() -> float:
-        return process_time() + seconds_of_children()
+    def left() -> float:
+        return max(SECONDS - VALIDATING - process_time() - seconds_of_children(), 1.0)
 
     found = imported(parse_files(domain, problem))
-    if only_during(found.problem):
-        timed = concurrent.plan(found.problem, Limits(), EPSILON)[1].plan
-    else:
-        plan = solve(Request(found.problem, limits=Limits(seconds=SECONDS * OWN))).plan
-        if plan is None:
-            with suppress(KnowledgeError):  # no engine
-                plan = plan_by_engine(found.problem, None, None, SECONDS - VALIDATING - used()).plan
-        left = max(SECONDS - VALIDATING - used(), 1.0)
-        timed = None if plan is None else best_in_time(found.problem, plan, left, separation=EPSILON).plan
+    with TemporaryDirectory() as folder:
+        scene = Path(folder) / "scene.ttl"
+        scene.write_text(turtle(found.problem, problem.stem, "An imported problem."), encoding="utf-8")
+        result = confab.load(scene).plan(minimise="makespan", time_limit=left() - SPACING)
+    timed = result.timed
+    if timed is not None:
+        slots = list(enumerate(timed.slots))
+        begins = [(slot.begin, 1, number, EventKind.BEGIN) for number, slot in slots]
+        ends = [(slot.end, int(slot.begin == slot.end), number, EventKind.END) for number, slot in slots]
+        events = [(number, kind) for *_, number, kind in sorted((*begins, *ends), key=lambda one: one[:3])]
+        timed = in_time(result.problem, timed.plan, left(), EPSILON, events).plan
     if timed is None:
         print("null")
         return
