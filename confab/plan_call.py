@@ -5,6 +5,7 @@ read_task     read the individuals that the task can need, or the whole scene
 planned       if steps must overlap, plan with times
               otherwise search; if the part of the scene has no valid plan, search in the whole scene
               schedule the plan, or plan with times if steps may have to overlap
+in_time       schedule the plan; with a time limit, then shorten the plan as long as its schedule keeps all deadlines
 searched      choose among the soft goals; each choice is a search
 search        the engine that the caller names, or Confab's own search and then an installed engine
 ```
@@ -12,9 +13,10 @@ search        the engine that the caller names, or Confab's own search and then 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from math import inf
@@ -26,7 +28,8 @@ from confab.checking import refused
 from confab.known import Known
 from confab.plan_options import NO_ENGINE, PlanOptions
 from confab.planner.certified import certified
-from confab.planner.plan import Limits, Outcome, Reason, Shortening, Status
+from confab.planner.plan import Limits, Outcome, Plan, Reason, Shortening, Status
+from confab.planner.plan_costs import compared, cost_of
 from confab.planner.solve import DEFAULT_MODE, Request, solve, unchecked
 from confab.planner.timed.plan import schedule_of
 from confab.reasoner.graph.knowledge import KnowledgeError
@@ -49,8 +52,7 @@ if TYPE_CHECKING:
     from confab.planner.timed.plan import TimedPlan
 
 OURS = 0.6
-"""The share of the time limit that Confab's own search may use; the rest is for an engine, or for scheduling the plan.
-"""
+"""The share of the time limit that Confab's own search may use if an engine may follow, or proofs that precede a schedule."""
 OURS_WORK = 10_000_000
 """Maximum work of Confab's own search (states times operators) before an engine is tried, if there is no time limit.
 
@@ -58,6 +60,10 @@ The search does this maximum work in about twenty seconds.
 """
 CHOICE = 0.25
 """The share of the remaining time in which a plan for one choice of soft goals is searched."""
+KEPT, KEPT_IN_TIME = 0.1, 0.3
+"""The shares of the time limit that choosing among soft goals leaves: by default, and for a schedule of the chosen goals."""
+SHORTENING = 0.7
+"""The share of the remaining time in which a plan with a schedule is shortened; the rest is for the new schedule."""
 CHOICE_WORK = 1_000_000
 """Maximum work of the search of a plan for one choice of soft goals, if there is no time limit.
 
@@ -116,7 +122,7 @@ class Searching(NamedTuple):
 
     By default, the work for a shorter plan depends on the time limit. If `most_work` is given, it limits the work of a search
     without a time limit, and the search uses no engine. `first` is an outcome whose plan is extended or shortened instead of
-    searching.
+    searching. Shortening keeps only plans that `accepts` allows.
     """
 
     mode: str
@@ -124,6 +130,7 @@ class Searching(NamedTuple):
     shortening: Shortening | None = None
     most_work: float = inf
     first: Outcome | None = None
+    accepts: Callable[[Plan], bool] | None = None
 
 
 def read_task(
@@ -186,18 +193,42 @@ def planned(task: PlanningTask) -> Found:
 
 
 def in_time(task: PlanningTask, problem: Problem, outcome: Outcome) -> tuple[Outcome, TimedPlan | None]:
-    """Schedule a plan; if it misses deadlines or windows, schedule a plan that is hardly shortened instead."""
-    shorten, left = task.options.minimise == "makespan", task.deadline.left
-    half = task.deadline if left is None else Deadline.after(left / 2)
-    found, timed = scheduled(problem, outcome, half, shorten)
-    if timed is not None or outcome.plan is None:
+    """Schedule a plan; if it misses deadlines or windows, schedule a plan that is hardly shortened instead.
+
+    A plan that isn't shortened for its makespan is shortened after it has been scheduled, if there is a time limit.
+    """
+    shorten, mode = task.options.minimise == "makespan", task.options.strategy
+    found, timed = scheduled(problem, outcome, task.deadline, shorten)
+    if outcome.plan is None or task.options.by_engine:
         return found, timed
-    mode = task.options.strategy
+    how = Searching(DEFAULT_MODE if mode == "optimal" else mode, shortening="brief")
     with suppress(OutOfTimeError):
-        other = search(task, problem, Searching(DEFAULT_MODE if mode == "optimal" else mode, shortening="brief"))
-        if other.plan is not None and other.plan.primitives != outcome.plan.primitives:
-            longer, timed = scheduled(problem, other, task.deadline, shorten)
-            found = found if timed is None else replace(longer, bound=outcome.bound)
+        if timed is None:
+            other = search(task, problem, how)
+            if other.plan is not None and other.plan.primitives != outcome.plan.primitives:
+                longer, timed = scheduled(problem, other, task.deadline, shorten)
+                found = found if timed is None else replace(longer, bound=outcome.bound)
+        if timed is not None and not shorten and mode != "paper" and task.deadline.left is not None:
+            return shortened_in_time(task, problem, found, timed, how)
+    return found, timed
+
+
+def shortened_in_time(
+    task: PlanningTask, problem: Problem, found: Outcome, timed: TimedPlan, how: Searching
+) -> tuple[Outcome, TimedPlan]:
+    """Shorten a plan with a schedule; return the cheapest plan whose schedule keeps all deadlines and windows."""
+    from confab.planner.timed.call import keeps_times
+
+    priced = with_unit_costs(problem) if task.options.minimise == "steps" else problem
+    if schedule_of(found) is not None or (found.bound is not None and cost_of(priced, timed.plan) <= found.bound):
+        return found, timed
+    before = compared(priced, timed.plan.primitives)
+    how = how._replace(share=SHORTENING, shortening="repeated", first=found, accepts=partial(keeps_times, problem))
+    shorter = search(task, problem, how).plan
+    if shorter is not None and compared(priced, shorter.primitives) < before:
+        other, again = scheduled(problem, replace(found, plan=shorter), task.deadline, False)
+        if again is not None and compared(priced, again.plan.primitives) < before:
+            return other, again
     return found, timed
 
 
@@ -246,6 +277,8 @@ def searched(task: PlanningTask, problem: Problem) -> tuple[Problem, Outcome]:
     alike = with_unit_costs(problem) if task.options.minimise == "steps" else problem
     first, seconds = Searching(DEFAULT_MODE if mode == "optimal" else mode, shortening="none"), task.deadline.left
     bounded, worked = first._replace(share=CHOICE, most_work=CHOICE_WORK), 0
+    kept = (seconds or 0.0) * (KEPT_IN_TIME if asks_for_times(problem, task.options.minimise) else KEPT)
+    known: dict[tuple[object, ...], Outcome] = {}
 
     def comparing(choice: Problem) -> Searching:
         if choice.goal.keys().isdisjoint(problem.weights):
@@ -255,7 +288,13 @@ def searched(task: PlanningTask, problem: Problem) -> tuple[Problem, Outcome]:
     def in_its_times(choice: Problem, found: Outcome) -> Outcome:
         if found.plan is None or not asks_for_times(choice, None):
             return found
-        return scheduled(task.with_measured_durations(choice), found, task.deadline, False)[0]
+        key = (*choice.goal, *((step.behavior, step.arguments) for step in found.plan.primitives))
+        if key not in known:
+            left = task.deadline.left
+            half = task.deadline if left is None else Deadline.after(left / 2)
+            known[key] = scheduled(task.with_measured_durations(choice), found, half, False)[0]
+        same = known[key]
+        return replace(found, status=same.status, plan=same.plan, reason=same.reason, left=same.left, cost=same.cost)
 
     def choose(choice: Problem) -> Outcome:
         limit = "half of the time limit, which is for proofs"
@@ -270,14 +309,14 @@ def searched(task: PlanningTask, problem: Problem) -> tuple[Problem, Outcome]:
 
     def extended(choice: Problem, found: Outcome) -> Outcome:
         how = bounded._replace(first=found)
-        return in_its_times(choice, search_in_time(task, how, (seconds or 0.0) / 10, "the time limit", choice))
+        return in_its_times(choice, search_in_time(task, how, kept, "the time limit", choice))
 
     fixed = task.options.by_engine or mode == "paper"
     extend = None if fixed else extended
     if seconds is None and mode != "optimal":
         chosen, outcome = preferred(alike, choose, shorten=None if fixed else shorten, extend=extend)
     else:
-        least = max((seconds or 0.0) / 10, 2 * task.checking)
+        least = max(kept, 2 * task.checking)
 
         def prove(choice: Problem) -> Outcome:
             how = Searching(mode, share=0.5)
@@ -317,12 +356,13 @@ def search(task: PlanningTask, problem: Problem, how: Searching) -> Outcome:
 def own_request(task: PlanningTask, problem: Problem, how: Searching, engines: bool) -> Request:
     """Return the request for Confab's own search; if engines or scheduling may follow, a part of the time is kept for them."""
     options, seconds, memory = task.options, task.deadline.left, task.memory
+    timed = asks_for_times(problem, options.minimise)
     if seconds is not None:
         from confab.engines import some_installed
 
-        more = asks_for_times(problem, options.minimise) or (engines and some_installed(problem))
+        more = (timed and how.mode == "optimal") or (engines and some_installed(problem))
         seconds = min(seconds * how.share * (OURS if more else 1.0), max(seconds - task.checking, seconds / 2))
-    once = seconds is None or options.minimise == "makespan"
+    once = seconds is None or timed
     shortening = how.shortening or ("once" if once else "repeated")
     links = (
         memory
@@ -334,7 +374,12 @@ def own_request(task: PlanningTask, problem: Problem, how: Searching, engines: b
     return Request(
         task.with_measured_durations(with_unit_costs(problem) if options.minimise == "steps" else problem),
         how.mode,
-        Limits(seconds=seconds, work=how.most_work if seconds is None else inf, shortening=shortening),
+        Limits(
+            seconds=seconds,
+            work=how.most_work if seconds is None else inf,
+            shortening=shortening,
+            accepts=how.accepts,
+        ),
         None if memory is None or isinstance(memory, Links) else memory.advisor,
         links,
         task.grounds,

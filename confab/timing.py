@@ -94,16 +94,13 @@ def said(seconds: Fraction) -> str:
 
 def headline(timed: TimedPlan) -> str:
     """Return the makespan and its lower bound in one line."""
-    bound = said(timed.bound)
-    proved = " (no schedule of these steps is shorter)" if timed.bound == timed.makespan else ""
+    these, others = f"schedules of {timed.bounds} take at least {said(timed.bound)} s", "other steps may take less"
+    if timed.bound == timed.makespan:
+        these = f"no schedule of {timed.bounds} is shorter"
     if timed.least:
-        proved += f", {said(timed.least)} s for any plan"
-    if timed.least == timed.makespan:
-        proved += " (no plan is shorter)"
-    return (
-        f"makespan {said(timed.makespan)} s, {said(timed.serial)} s one step after the other; "
-        f"at least {bound} s for {timed.bounds}{proved}; by {timed.scheduler}"
-    )
+        others = f"any plan takes at least {said(timed.least)} s"
+    bounds = "no plan is shorter" if timed.least == timed.makespan else f"{these}, but {others}"
+    return f"makespan {said(timed.makespan)} s, {said(timed.serial)} s one step after the other; {bounds}; by {timed.scheduler}"
 
 
 def lanes(timed: TimedPlan) -> Iterator[str]:

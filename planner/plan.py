@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from enum import Enum
@@ -411,12 +411,14 @@ class Limits:
     times operators, about a microsecond each. `shortening` is the work for a shorter plan. With "none", there is no round;
     with "once", there is one round. With "brief", there is one round with little work, or no round if `seconds` is given. With
     "repeated", rounds follow one another until the second half of them has saved nothing, or until `seconds` have passed.
+    Shortening keeps only plans that `accepts` allows.
     """
 
     expansions: int = 200_000
     seconds: float | None = None
     work: float = math.inf
     shortening: Shortening = "once"
+    accepts: Callable[[Plan], bool] | None = None
 
     def end(self, share: float = 1.0) -> float | None:
         """Return the time at which a share of the remaining time ends, on the clock of `perf_counter`, or None without a limit.

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -85,6 +85,8 @@ class Call:
         """The cost that the last round of shortening saved per second; None before shortening."""
         self.bound: float | None = None
         """A lower bound on the cost of every plan, if the primitives have different costs."""
+        self.accepts: Callable[[Plan], bool] = lambda plan: True
+        """Whether a shorter plan may take the place of the plan."""
         self.brought_to_rest = False
         """Whether the planner has tried to bring to rest the symbols that aren't at rest in the initial state."""
 

@@ -130,6 +130,7 @@ def _plan(
     except LimitError as limit:
         return flat or Outcome(Status.GAVE_UP, reason=Reason(str(limit)))
     call.space.most_work, call.space.shortening = limits.work, limits.shortening
+    call.accepts = limits.accepts or call.accepts
     advised(call)
     levels = call.program.levels if leave_levels else call.program.levels[:1]
     agenda = Agenda(call, levels, below=partial(below, call, limits) if leave_levels else None)

@@ -192,7 +192,7 @@ def reordered(call: Call, work: int, advised: Callable[[Call], None], random: Ra
         with suppress(LimitError):
             if agenda.achieve_all() and cost(other) <= cost(call):
                 order[:] = other.kept
-                call.steps = other.steps if cost(other) < cost(call) else call.steps
+                call.steps = other.steps if cost(other) < cost(call) and call.accepts(other.tree()) else call.steps
         work -= other.space.effort + DOING * len(primitives(other.steps))
 
 
@@ -219,7 +219,7 @@ def drop_detours(call: Call, level: int) -> bool:
     steps, old = call.steps, call.tree()
     call.steps = without_detours(call.refiner, steps, level)
     new = call.tree()
-    if not improves(call.problem, new, old, level):
+    if not improves(call.problem, new, old, level) or not call.accepts(new):
         call.steps = steps
         return False
     if len(new.at_level(call.program.levels[0])) < len(old.at_level(call.program.levels[0])):

@@ -56,7 +56,7 @@ def replaced(call: Call, level: int, new: Sequence[Ground]) -> bool:
         Agenda(other, call.program.levels[:1], quickly=True, trial=True).achieve_all()
     problem, old = call.problem, call.tree()
     for plan in regroupings(problem, other.tree(), level, call.using):
-        if improves(problem, plan, old, level) and not validate(problem, plan):
+        if improves(problem, plan, old, level) and not validate(problem, plan) and call.accepts(plan):
             call.steps = as_refined(call, plan.steps)
             return True
     return False

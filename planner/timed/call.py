@@ -33,6 +33,9 @@ from confab.reasoner.limits import LimitError, check, overtime, within
 from confab.reasoner.symbols import Fact, Problem, Times
 from confab.reasoner.timing import judged_by_events
 
+KEPT = 0.2
+"""The share of the remaining time that sharing the goals among actors leaves for scheduling the resulting steps."""
+
 
 @dataclass(frozen=True)
 class Timed:
@@ -73,8 +76,8 @@ def best_in_time(
 
     until = None if seconds is None else perf_counter() + seconds
 
-    def left(parts: int) -> float | None:
-        return None if until is None else max(until - perf_counter(), 0.0) / parts
+    def left(share: float) -> float | None:
+        return None if until is None else max(until - perf_counter(), 0.0) * share
 
     def enough(one: Timed) -> bool:
         timed = one.plan
@@ -83,24 +86,36 @@ def best_in_time(
         )
 
     try:
-        found = in_time(problem, plan, left(4), separation)
+        found = in_time(problem, plan, left(0.25 if shorten else 1.0), separation)
     except LimitError as limit:
         return Timed(reason=Reason(str(limit)))
     bound = Fraction(0)
     if shorten:
-        with suppress(LimitError), within(left(4)):
+        with suppress(LimitError), within(left(0.25)):
             bound = of_any_plan(problem)
-        found = _spread(problem, plan, found, left(3), separation)
+        found = _spread(problem, plan, found, left(0.33), separation)
     if not enough(found):
-        end = until if until is None else (3 * until + perf_counter()) / 4
+        end = None if until is None else until - KEPT * (until - perf_counter())
         other = shared(problem, plan, end, shorten, bound)
         if other is not None:
             with suppress(LimitError):
-                found = _better(found, in_time(problem, other, left(2), separation))
-            found = _spread(problem, other, found, left(1), separation) if shorten else found
+                found = _better(found, in_time(problem, other, left(0.5 if shorten else 1.0), separation))
+            found = _spread(problem, other, found, left(1.0), separation) if shorten else found
     if found.plan is None or not shorten:
         return found
     return replace(found, plan=replace(found.plan, least=bound, bound=max(found.plan.bound, bound)))
+
+
+def keeps_times(problem: Problem, plan: Plan) -> bool:
+    """Return whether a schedule of the steps of a plan is found that keeps all time windows and deadlines."""
+    steps = plan.primitives
+    try:
+        order = order_of(problem, activities(problem, steps, in_sequence(steps)), in_sequence(steps))
+    except InapplicableError:
+        return False
+    network = network_of(order)
+    found = shortest(order, network, choices_of(problem, plan, order, network), inf, inf)
+    return found is not None and not found.begins.late
 
 
 def _spread(problem: Problem, plan: Plan, known: Timed, seconds: float | None, separation: Fraction) -> Timed:

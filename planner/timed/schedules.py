@@ -63,7 +63,7 @@ class CandidateSchedule:
 
 
 def shortest(
-    order: Order, network: Network, choices: ActorChoices, until: float, bound: int = 0
+    order: Order, network: Network, choices: ActorChoices, until: float, bound: float = 0
 ) -> CandidateSchedule | None:
     """Return the best schedule that the greedy construction and exchanges of turns find, or None if no schedule is found.
 
@@ -77,8 +77,8 @@ def shortest(
     choices : ActorChoices
     until : float
         The end of the search on the clock of `perf_counter`; 0 keeps the order of the sequence.
-    bound : int
-        A lower bound on the makespan.
+    bound : float
+        A lower bound on the makespan; infinite if any schedule that isn't late is good enough.
     """
     search = _ScheduleSearch(order, network, choices)
     starts = [search.evaluated(turns) for turns in islice(search.starts(), None if until else 1)]
@@ -193,7 +193,7 @@ class _ScheduleSearch:
         if listed is not None:
             yield listed
 
-    def improved(self, best: CandidateSchedule, until: float, bound: int) -> CandidateSchedule:
+    def improved(self, best: CandidateSchedule, until: float, bound: float) -> CandidateSchedule:
         """Return the best schedule after exchanges of turns on the critical path."""
         now, barren = best, 0
         left = (

@@ -214,6 +214,8 @@ class _SharingSearch:
     stretches: dict[object, _Stretch | None] = field(default_factory=dict)
     work: int = 0
     most: float = MOST_WORK
+    half: float = 0.0
+    """The time from which the maximum work applies, on the clock of `perf_counter`."""
     known: dict[tuple[SharedTask, frozenset[Aim]], list[tuple[Step, ...]]] = field(default_factory=dict)
     """Known sequences of steps for each task after the same early steps; the planner tries these sequences before it searches."""
     failed: Counter[SharedTask] = field(default_factory=Counter)
@@ -258,11 +260,11 @@ class _SharingSearch:
 
     def run(self) -> None:
         """Build the sequence of the plan and the greedy sequence, and improve the better sequence by changes."""
-        self.best, until, greedy = self.own(), self.until, None
-        self.most, self.until = MOST_WORK // 2, None if until is None else (perf_counter() + until) / 2
+        self.best, greedy = self.own(), None
+        self.limit(MOST_WORK // 2)
         with suppress(LimitError):
             greedy = self.greedy()
-        self.most, self.until = MOST_WORK if until is None else inf, until
+        self.limit(inf if self.shorten and self.until is not None else MOST_WORK)
         if self.best is None or (greedy is not None and greedy.cost < self.best.cost):
             self.best = greedy
         now = self.best
@@ -464,12 +466,18 @@ class _SharingSearch:
         steps = call.tree().steps
         return None if not isinstance(aim, Symbol) and validate(problem, Plan(steps)) else steps
 
+    def limit(self, work: float) -> None:
+        """Set the maximum work; with a time limit, more work is allowed in the first half of the remaining time."""
+        now = perf_counter()
+        self.most, self.half = work, now if self.until is None else (now + self.until) / 2
+
     def spend(self, work: int) -> None:
         """Count work; raise `LimitError` at the limit of work or at the time limit."""
         self.work += work
-        if self.work > self.most:
+        now = perf_counter()
+        if self.work > self.most and now > self.half:
             raise LimitError(f"{self.most} states times operators")
-        if self.until is not None and perf_counter() > self.until:
+        if self.until is not None and now > self.until:
             raise LimitError("the time limit")
 
     @cached_property

@@ -15,7 +15,7 @@ from confab.planner.solve import Request, solve
 from confab.planner.timed.bounds import of_any_plan
 from confab.planner.timed.call import Timed, best_in_time, in_time
 from confab.planner.timed.measuring import measured, with_durations
-from confab.planner.timed.plan import TimedPlan, schedule_of
+from confab.planner.timed.plan import Slot, TimedPlan, schedule_of
 from confab.planner.timed.validation import validate_timed
 from confab.reasoner.generate import write_scene
 from confab.reasoner.graph.knowledge import load
@@ -36,7 +36,7 @@ from confab.reasoner.symbols import (
     ValueCondition,
     ValueEffect,
 )
-from confab.timing import scheduled
+from confab.timing import headline, scheduled
 from worlds.families import family, table
 from worlds.timed import Action, TimedWorld, least_makespan, problem_of, rejected, timed_world
 
@@ -424,7 +424,17 @@ def test_the_bound_of_any_plan_proves_that_no_plan_is_shorter(tmp_path: Path) ->
     result = confab.load(tmp_path / "shelves.ttl").plan(
         ["b1 AT s1", "b2 AT s1", "b3 AT s2", "b4 AT s2"], minimise="makespan"
     )
-    assert "10 s for any plan (no plan is shorter)" in str(result)
+    assert "; no plan is shorter; by" in str(result)
+
+
+def test_a_bound_for_the_steps_of_a_plan_is_not_said_to_bound_other_plans() -> None:
+    slot = Slot(Step((0,), 1, 1, "WASH", ()), Fraction(0), Fraction(9))
+    timed = TimedPlan(Plan((slot.step,)), (slot,), Fraction(9), least=Fraction(4))
+    assert "; no schedule of these steps is shorter, but any plan takes at least 4 s; by" in headline(timed)
+    assert "; no schedule of these steps is shorter, but other steps may take less" in headline(
+        replace(timed, least=Fraction(0))
+    )
+    assert "; schedules of these steps take at least 7 s, but any" in headline(replace(timed, bound=Fraction(7)))
 
 
 def test_measured_durations_give_each_hand_its_own_speed() -> None:

@@ -14,13 +14,15 @@ import confab
 import confab.plan_call
 import confab.timing
 from confab.cli import app
-from confab.planner.plan import Outcome, Status
-from confab.planner.solve import Mode
+from confab.planner.plan import Limits, Outcome, Plan, Status
+from confab.planner.solve import Mode, Request, solve
 from confab.planner.timed.plan import TimedPlan
 from confab.planner.timed.sharing import crews_of
 from confab.planning import Result
+from confab.reasoner.limits import OutOfTimeError
 from confab.reasoner.symbols import Problem, Symbol
 from confab.timing import Minimise
+from worlds.families import family
 
 ROBOTS = '''
 @prefix : <https://example.org/robots#> .
@@ -244,8 +246,61 @@ def test_a_longer_plan_is_scheduled_if_a_cheapest_plan_misses_its_deadlines(
     monkeypatch.setattr("confab.plan_call.search", searched)
     monkeypatch.setattr("confab.plan_call.scheduled", scheduled)
     result = planned(tmp_path, {"r1": "hall"}, {"a": 60}, minimise="cost")
-    assert (result.solved, plans) == ((True, [2, 3]) if longer else (False, [2]))
+    assert (result.solved, plans[:2]) == ((True, [2, 3]) if longer else (False, [2]))
     assert result.outcome.bound == 2
+
+
+SOAK = '''
+:SOAK a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 4 ; c:actor :SOAK.robot ;
+  c:duration "PT60S"^^xsd:dayTimeDuration ; c:update """
+  INSERT { ?room :CLEAN true } WHERE { ?robot a :Robot . ?room a :Room . ?room :CLEAN false }""" .
+:SOAK.robot a owl:NamedIndividual .
+'''
+"""A robot soaks a room from anywhere, in one long step."""
+
+
+@pytest.mark.parametrize("limit", [None, 60.0])
+def test_a_plan_is_shortened_as_long_as_its_deadlines_are_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, limit: float | None
+) -> None:
+    monkeypatch.setattr(f"{__name__}.ROBOTS", ROBOTS + SOAK)
+    with confab.within(limit):
+        result = planned(tmp_path, {"r1": "hall"}, {"a": 20, "b": None})
+    assert result.solved
+    assert sorted(step.behavior for step in result.plan.primitives) == ["GO", "SOAK", "WASH"]
+
+
+@pytest.mark.parametrize("found", ["nothing", "a late plan"])
+def test_a_plan_that_keeps_its_deadlines_is_never_lost_to_shortening(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, found: str
+) -> None:
+    search = confab.plan_call.search
+
+    def searched(task: Any, problem: Problem, how: confab.plan_call.Searching) -> Outcome:
+        if how.shortening != "repeated":
+            return search(task, problem, how)
+        if found == "nothing":
+            raise OutOfTimeError("the time limit")
+        return search(task, problem, confab.plan_call.Searching("guarded"))
+
+    monkeypatch.setattr(f"{__name__}.ROBOTS", ROBOTS + SOAK)
+    monkeypatch.setattr("confab.plan_call.search", searched)
+    with confab.within(60):
+        assert planned(tmp_path, {"r1": "hall"}, {"a": 20}).solved
+
+
+def never(plan: Plan) -> bool:
+    return False
+
+
+def test_shortening_keeps_only_plans_that_are_accepted() -> None:
+    problem = family("swap", 6, 1)
+    first = solve(Request(problem, limits=Limits(shortening="none")))
+    assert first.plan is not None
+    for accepts in (None, never):
+        found = solve(Request(problem, limits=Limits(shortening="once", accepts=accepts), first=first))
+        assert found.plan is not None
+        assert (found.plan.primitives != first.plan.primitives) == (accepts is None)
 
 
 def test_a_charger_with_a_window_that_is_too_short_is_avoided(tmp_path: Path) -> None:
