@@ -33,7 +33,7 @@ from confab.reasoner.limits import LimitError, check, overtime, within
 from confab.reasoner.symbols import Fact, Problem, Times
 from confab.reasoner.timing import judged_by_events
 
-KEPT = 0.2
+KEPT = 0.25
 """The share of the remaining time that sharing the goals among actors leaves for scheduling the resulting steps."""
 
 

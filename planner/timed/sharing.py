@@ -7,6 +7,7 @@ were achieved before still hold after a stretch.
 
 The first sequence of tasks follows the plan, or assigns each goal greedily to the crew that achieves the goal first. Then the
 search makes one change at a time, preferably to a task on the critical path. A change concerns the crew or the position of a task.
+If the makespan is minimised with a time limit, the search goes on from the best sequence after a few changes, whatever they cost.
 The search ends if the schedule reaches a lower bound, if all actors are busy for the whole makespan, or after many changes without
 a better schedule. Without a time limit, the work is bounded, too, so that the result is the same on every machine.
 """
@@ -51,6 +52,11 @@ A late schedule is changed up to the second number.
 """
 BUSY = Fraction(103, 100)
 """A schedule isn't improved further if the makespan times the number of actors is at most this number times the actors' work."""
+DISTURBING, BARREN_ROUNDS = 4, 6
+"""Number of changes that begin a further round, whatever they cost, and maximum number of further rounds without a better schedule.
+
+Further rounds follow only if the makespan is minimised with a time limit. Each round begins with the best sequence.
+"""
 MOST_KNOWN = 4
 """Maximum number of known sequences of steps that are tried for a stretch."""
 MOST_COMPILED = 200
@@ -260,30 +266,53 @@ class _SharingSearch:
 
     def run(self) -> None:
         """Build the sequence of the plan and the greedy sequence, and improve the better sequence by changes."""
-        self.best, greedy = self.own(), None
+        self.best, until, greedy = self.own(), self.until, None
+        if until is not None and self.best is not None and not self.best.cost[0]:
+            self.until = (perf_counter() + until) / 2
         self.limit(MOST_WORK // 2)
         with suppress(LimitError):
             greedy = self.greedy()
+        self.until = until
         self.limit(inf if self.shorten and self.until is not None else MOST_WORK)
         if self.best is None or (greedy is not None and greedy.cost < self.best.cost):
             self.best = greedy
-        now = self.best
-        if now is None:
+        if self.best is None:
             return
-        random, changes, better = Random(0), 0, 0
-        while now.critical and changes - better < self.most_barren(now, better):
-            if not (self.shorten or now.cost[0]):
-                break
-            if not now.cost[0] and (now.cost[1] <= self.bound or evenly_shared(self.problem, now.work, now.cost[1])):
-                break
+        random, barren = Random(0), 0
+        self.improve(self.best, random)
+        most = BARREN_ROUNDS if self.shorten and self.until is not None else 0
+        while barren < most and not self.enough(self.best):
+            cost = self.best.cost
+            self.improve(self.disturbed(self.best, random), random)
+            barren = 0 if self.best.cost < cost else barren + 1
+
+    def enough(self, now: _Sequence) -> bool:
+        """Return whether a sequence needn't be improved."""
+        late, makespan, _ = now.cost
+        return not late and (
+            not self.shorten or makespan <= self.bound or evenly_shared(self.problem, now.work, makespan)
+        )
+
+    def disturbed(self, now: _Sequence, random: Random) -> _Sequence:
+        """Return a sequence after a few changes, whatever they cost."""
+        for _ in range(DISTURBING):
+            self.spend(0)
+            now = (self.built(self.changed(now, random), now) if now.critical else None) or now
+        return now
+
+    def improve(self, now: _Sequence, random: Random) -> None:
+        """Improve a sequence by changes that don't make it worse; keep the best sequence."""
+        assert self.best is not None
+        changes = better = 0
+        while now.critical and changes - better < self.most_barren(now, better) and not self.enough(self.best):
             self.spend(0)
             other = self.built(self.changed(now, random), now)
             changes += 1
             if other is None or other.cost > now.cost:
                 continue
-            if other.cost < now.cost:
-                better = changes
-            now = self.best = other
+            better = changes if other.cost < now.cost else better
+            now = other
+            self.best = min(now, self.best, key=lambda one: one.cost)
 
     def most_barren(self, now: _Sequence, better: int) -> int:
         """Return the maximum number of successive changes without a better schedule after `better` changes.

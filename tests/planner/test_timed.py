@@ -37,6 +37,7 @@ from confab.reasoner.symbols import (
     ValueEffect,
 )
 from confab.timing import headline, scheduled
+from worlds.deliveries import deliveries
 from worlds.families import family, table
 from worlds.timed import Action, TimedWorld, least_makespan, problem_of, rejected, timed_world
 
@@ -425,6 +426,15 @@ def test_the_bound_of_any_plan_proves_that_no_plan_is_shorter(tmp_path: Path) ->
         ["b1 AT s1", "b2 AT s1", "b3 AT s2", "b4 AT s2"], minimise="makespan"
     )
     assert "; no plan is shorter; by" in str(result)
+
+
+def test_with_a_time_limit_the_goals_are_shared_in_more_ways() -> None:
+    problem = deliveries(5, 2, 3)
+    plan = solve(Request(problem)).plan
+    assert plan is not None
+    first, other = best_in_time(problem, plan).plan, best_in_time(problem, plan, 300.0).plan
+    assert first is not None and other is not None
+    assert other.makespan < first.makespan
 
 
 def test_a_bound_for_the_steps_of_a_plan_is_not_said_to_bound_other_plans() -> None:
