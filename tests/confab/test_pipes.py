@@ -38,6 +38,14 @@ def test_a_scene_a_plan_and_a_query_come_from_stdin_and_results_go_to_stdout() -
     assert (code, rows) == (0, "w\nlocation2\n")
 
 
+def test_a_plan_is_printed_to_a_pipe_without_the_library_that_draws_in_terminals() -> None:
+    undrawn = [*RUN[:2], f"import sys; sys.modules['rich'] = None\n{RUN[2]}"]
+    code, plan, _ = piped("plan", "towers-small", line=undrawn)
+    assert code == 0
+    assert plan.splitlines()[1:] == piped("plan", "towers-small")[1].splitlines()[1:]
+    assert plan.splitlines()[1].startswith("└── ")
+
+
 def test_stdin_is_read_once_and_pictures_do_not_go_to_stdout() -> None:
     code, _, said = piped("execute", "-", "--plan", "-", given=TOWERS)
     assert code == 2
