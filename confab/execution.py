@@ -32,6 +32,7 @@ from confab.planner.acting.failure_memory import Caution
 from confab.planner.acting.retries import RetryPolicy
 from confab.planner.acting.symbolic_world import SymbolicWorld, with_individual
 from confab.planner.acting.world import World
+from confab.planner.finding import numbers
 from confab.planner.plan import Plan, Planner, SoftGoal
 from confab.planner.solve import DEFAULT_MODE, Mode
 from confab.planner.validation import open_goals, unmet_goals
@@ -164,9 +165,12 @@ class Execution(metaclass=RightNames):
         if not episode.missed:
             return text
         missed = ", ".join(intervention.text for intervention in episode.missed)
-        by_id = any(isinstance(intervention.after, int) for intervention in episode.missed)
+        asked = {intervention.after for intervention in episode.missed if isinstance(intervention.after, int)}
         ids = some_of([*dict.fromkeys(str(step.id) for step in episode.planned.steps)])
-        said = f" (after=ID names a step of the first level: {ids})" if by_id and ids else ""
+        names = numbers(episode.planned.walk())
+        below = {step.id: names[step.path] for step in reversed([*episode.planned.walk()]) if step.id in asked}
+        said = f" (after=ID names a step at the top of the plan: {ids})" if asked and ids else ""
+        said += "".join(f"; {one} is the ID of {name}, which after={name} names" for one, name in sorted(below.items()))
         return f"{text}; the step or time of an intervention wasn't reached: {missed}{said}"
 
     def graph(self) -> networkx.DiGraph[int]:

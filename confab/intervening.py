@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ from confab.reasoner.symbols import Fact, Problem, Symbol
 FORMS = (
     "'after=28 cup2 LOCATION location8', 'after=28 goal FACT', 'after=28 drop-goal cup2 LOCATION', 'after=28 remove cup2', "
     "'after=28 add Cup cup9 FACT', 'after=28 knock cup2', 'after=28 push cup2 6 -3' (cm), 'after=28 box location7 [6x6x12]' (cm), "
-    "with after=ID, after=PATH (0.1.2) or at=SECONDS"
+    "with after=ID, after=PATH (0.1.2), after=NAME (L2#0) or at=SECONDS"
 )
 
 
@@ -70,13 +70,11 @@ def parse_intervention(problem: Problem, text: str) -> Intervention:
         if match[1] == "at":
             when["at"] = _seconds(match[2])
         else:
-            # L1#2 names a first-level step; its path is (2,)
-            named = match[2].removeprefix(f"L{problem.domain.levels[0]}#")
-            path = named.split(".") if named == match[2] else [named]
-            when["after"] = int(match[2]) if match[2].isdigit() else tuple(map(_position, path))
+            when["after"] = _step_of(match[2], problem.domain.levels)
     except ValueError as error:
+        first, last = problem.domain.levels[0], problem.domain.levels[-1]
         raise KnowledgeError(
-            f"'{match[1]}={match[2]}' in '{text}': wanted an ID, a path like 0.1.2 or a name like L1#2 "
+            f"'{match[1]}={match[2]}' in '{text}': wanted an ID, a path like 0.1.2 or a name from L{first}#0 to L{last}#… "
             "for after, seconds from 0 on for at"
         ) from error
     verb, _, rest = match[3].partition(" ")
@@ -104,11 +102,17 @@ def parse_intervention(problem: Problem, text: str) -> Intervention:
     return Intervention(InterventionKind.WORLD, (fact,), **when)
 
 
-def _position(text: str) -> int:
-    """Convert a text to a position in a path of steps; raise ValueError if the text isn't a natural number."""
-    if not text.isdigit():
+def _step_of(text: str, levels: Sequence[int]) -> int | tuple[int, ...] | str:
+    """Return the ID, the path or the name of a step; raise ValueError if the text is none of these."""
+    if named := re.fullmatch(r"[lL](\d+)#(\d+)", text):
+        level, position = map(int, named.groups())
+        if level not in levels:
+            raise ValueError(text)
+        return f"L{level}#{position}"
+    if not re.fullmatch(r"\d+(\.\d+)*", text):
         raise ValueError(text)
-    return int(text)
+    path = tuple(map(int, text.split(".")))
+    return path if len(path) > 1 else path[0]
 
 
 def _seconds(text: str) -> float:

@@ -4,11 +4,21 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple, Protocol, TypeAlias
 
 from confab.reasoner.names import nearest
 
 Path: TypeAlias = "tuple[int, ...]"
+
+
+class Placed(Protocol):
+    """A step, or the place of a step: a path in the tree and a level."""
+
+    @property
+    def path(self) -> Path: ...
+
+    @property
+    def level(self) -> int: ...
 
 
 class StepPosition(NamedTuple):
@@ -24,7 +34,7 @@ class UnknownStepError(LookupError):
     """Raised if no step, or more than one step, has the given number, path or words."""
 
 
-def numbers(places: Iterable[StepPosition]) -> dict[Path, str]:
+def numbers(places: Iterable[Placed]) -> dict[Path, str]:
     """Return a number such as ``L2#3`` for each path: the level and the position on the level, counted from 0."""
     seen: dict[int, int] = {}
     found = {}

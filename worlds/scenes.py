@@ -367,7 +367,7 @@ class _Scene:
             situation = self.situations[symbol.situation]
             if self.world.owners[symbol.situation] and (not situation.boolean or symbol.situation in self.world.pairs):
                 continue
-            if value == situation.default and not (situation.boolean and value == TRUE):
+            if value == situation.default:
                 continue
             number += 1
             if situation.quantity is not None:

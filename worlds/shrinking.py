@@ -80,10 +80,10 @@ def smaller_worlds(world: RandomWorld) -> Iterator[RandomWorld]:
     for name in world.updates:
         yield replace(world, updates=world.updates - {name})
     for symbol, value in problem.initial.items():
-        if domain.situations[symbol.situation].boolean and value != FALSE:
-            yield replace(
-                world, problem=replace(problem, initial={s: v for s, v in problem.initial.items() if s != symbol})
-            )
+        if (kind := domain.situations[symbol.situation]).boolean and value != FALSE:
+            others = {s: v for s, v in problem.initial.items() if s != symbol}
+            initial = {**others, symbol: FALSE} if kind.default == TRUE else others
+            yield replace(world, problem=replace(problem, initial=initial))
     for one in domain.situations.values():
         for simpler in _simpler_situations(one):
             yield replace(

@@ -31,8 +31,8 @@ class InterventionKind(Enum):
 class Intervention:
     """An intervention by a person during an episode.
 
-    An intervention with `after` takes place when a step is finished: the first-level step with that ID (an int), or the
-    step with that path (a tuple). An intervention with `at` takes place when the world's clock shows that number of
+    An intervention with `after` takes place when a step is finished: the step at the top of the tree with that ID (an int), the
+    step with that path (a tuple), or the step with a name such as ``L3#2`` in the tree of executed and remaining steps. An intervention with `at` takes place when the world's clock shows that number of
     seconds, possibly while a primitive is running.
 
     Attributes
@@ -46,7 +46,7 @@ class Intervention:
         The object that is added, removed, pushed or knocked over, and its class.
     numbers : tuple of float
         Numbers in metres: the displacement of an object along x and y, or the width, depth and height of a box.
-    after : int or tuple of int, optional
+    after : int or tuple of int or str, optional
     at : float, optional
     text : str
         The original text of the intervention.
@@ -58,7 +58,7 @@ class Intervention:
     individual: str = ""
     kind: str = ""
     numbers: tuple[float, ...] = ()
-    after: int | tuple[int, ...] | None = None
+    after: int | tuple[int, ...] | str | None = None
     at: float | None = None
     text: str = ""
 

@@ -41,6 +41,7 @@ from confab.planner.acting.repair import difference, repair_or_replan, replan, v
 from confab.planner.acting.retries import DEFAULT, Retries, RetryPolicy
 from confab.planner.acting.unreached import blamed, blocked, with_discoveries
 from confab.planner.acting.world import INTERRUPTED, WITHOUT_EFFECT, Guarded, Verdict, World, WorldError, WorldReport
+from confab.planner.finding import numbers
 from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, renumbered
 from confab.planner.timed.activities import InapplicableError, StepSimulation
@@ -212,18 +213,21 @@ class _RunningEpisode:
             clock = self.world.seconds
         return self.record.episode(self.belief.problem, clock, tuple(self.waiting), self.world.measured)
 
+    def whole(self) -> Plan:
+        """Return the tree of the executed and the remaining steps."""
+        return Plan(tree_of({**self.record.done, **{step.path: step for step in Plan(self.agenda.steps).walk()}}))
+
     def say(self, what: str, step: Step | None = None, expected: Iterable[Fact] = (), text: str = "") -> None:
         """Notify the observer of an event, if the episode has an observer."""
         if self.observer is None:
             return
         done, events = self.record.done, self.record.events
         surprises = events[-1].surprises if events and what == "end" else ()
-        whole = Plan(tree_of({**done, **{p.path: p for p in Plan(self.agenda.steps).walk()}}))
         clock = 0.0
         with suppress(WorldError):
             clock = self.world.seconds
         self.observer(
-            Event(what, whole, frozenset(done), step, tuple(expected), surprises, text, clock, self.belief.problem)
+            Event(what, self.whole(), frozenset(done), step, tuple(expected), surprises, text, clock, self.belief.problem)
         )
 
     # --------------------------------------------------------------------------------------------------- acting
@@ -404,9 +408,9 @@ class _RunningEpisode:
         left = {step.path for step in Plan(without(steps, finished)).walk()}
         gone = {step.path: step for step in (*self.record.done.values(), *Plan(steps).walk())}
         gone = {path: step for path, step in gone.items() if path not in left}
-        first = self.belief.problem.domain.levels[0]
-        ids = {one.id for step in gone.values() if step.level == first for one in step.together}
-        due = [i for i in self.waiting if (i.after in ids if isinstance(i.after, int) else i.after in gone)]
+        ids = {one.id for step in gone.values() if len(step.path) == 1 for one in step.together}
+        names = {number for path, number in numbers(self.whole().walk()).items() if path in gone}
+        due = [i for i in self.waiting if i.after in {*ids, *gone, *names}]
         return due + [i for i in self.waiting if i.at is not None and i.at <= self.world.seconds]
 
     def note_what_happened_by_the_clock(self) -> None:

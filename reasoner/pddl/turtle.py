@@ -350,7 +350,7 @@ class _SceneWriter:
         """Yield the initial values of symbols, except default values and rest values."""
         for symbol, value in self.problem.initial.items():
             situation = self.problem.domain.situations[symbol.situation]
-            if value in (situation.default, situation.rest) or (situation.boolean and value == FALSE):
+            if value == (situation.default or situation.rest or (FALSE if situation.boolean else None)):
                 continue
             single = len(symbol.arguments) == 1 and not situation.boolean
             prop = f":{situation.name}.value" if single else ""

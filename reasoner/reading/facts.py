@@ -166,9 +166,10 @@ def initial_state(
     Raise `KnowledgeError` if a symbol has several stated values, or has no stated value and no default.
     """
     initial = {}
+    defined = {*domain.rules, *domain.aggregates, *domain.remembers}
     for situation in domain.situations.values():
-        if situation.boolean or situation.name in domain.aggregates:
-            continue
+        if situation.name in defined or (situation.boolean and situation.default != TRUE):
+            continue  # a missing boolean symbol is false
         every = product(*(classes.get(kind, ()) for kind in situation.arguments))
         for arguments in checked(every, READING):
             symbol = Symbol(situation.name, arguments)
@@ -183,7 +184,8 @@ def initial_state(
                     f"{symbol} has {what}; {wrong}state "
                     + ("one of them" if values else f"a value in the scene, or a {default} of {situation.name}")
                 )
-            initial[symbol] = values[0]
+            if not situation.boolean or values[0] == TRUE:
+                initial[symbol] = values[0]
     members = {kind: frozenset(those) for kind, those in classes.items()}
     for symbol in sorted(
         s for s, values in stated.items() if domain.situations[s.situation].boolean and TRUE in values

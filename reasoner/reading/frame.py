@@ -419,6 +419,12 @@ def _situations(
                     raise KnowledgeError(f"{name} is an amount, and has a c:{local_name(prop)}; {remedy}", iri)
         rest = schema.values(iri, "restValue")
         default = schema.values(iri, "defaultValue") or rest
+        if iri in schema.pairs and default and schema.term(default[0]) == TRUE:
+            raise KnowledgeError(
+                f"{name} holds only of the pairs that are stated, so it can't be true of every pair by c:restValue or c:defaultValue; "
+                "drop the value, or declare the opposite situation type",
+                iri,
+            )
         found.append(
             SituationType(
                 name=name,

@@ -341,6 +341,8 @@ def _steps(condition: Condition, scope: _TypedConjunction, known: Frame) -> Iter
         properties = frozenset()
     nodes = frozenset(PLACES[1:]) if known.schema.tuples else frozenset()
     # facts with a default value may be unstated, so these facts can't be used to find arguments
+    if situation is not None and situation.default == TRUE:
+        return
     unstated = (
         situation is not None
         and len(arguments) > len(situation.arguments)

@@ -61,6 +61,9 @@ def with_facts(graph: KnowledgeGraph, reading: Reading, facts: Sequence[Fact]) -
         for node in _about(copy, reading, symbol):
             _remove(copy, node)
         copy.extend("asserted", said(reading, fact, prop, ox.BlankNode()))
+        if fact.value == FALSE and reading.problem.domain.situations[symbol.situation].default == TRUE:
+            stated = symbol_properties(iri(symbol.situation), [*map(iri, symbol.arguments)], CORE + FALSE)
+            copy.extend("asserted", triples(ox.BlankNode(), {TYPE: [CORE + "SituatedObjectInstance"], **stated}))
     return copy
 
 

@@ -124,7 +124,7 @@ class Surroundings:
                     name, terms = iri(relation), about
                 case ValueCondition(situation, about, value, False) if value != FALSE and situation not in rules:
                     kind = situations[situation]
-                    if kind.quantity is not None or (not kind.boolean and kind.default == value):
+                    if kind.quantity is not None or kind.default == value:
                         continue
                     name, terms = iri(situation), about if value == TRUE else (*about, value)
                 case _:

@@ -59,8 +59,32 @@ def test_interventions_whose_step_or_time_never_came_are_reported() -> None:
     assert execution.json()["never_came"] == never
     assert execution.summary().endswith(
         "the step or time of an intervention wasn't reached: after=999 remove cup2, at=9999 remove cup2 "
-        "(after=ID names a step of the first level: 22, 28, 34, 39)"
+        "(after=ID names a step at the top of the plan: 22, 28, 34, 39)"
     )
+
+
+def test_an_intervention_names_any_step_by_its_name_as_explain_does() -> None:
+    scene = confab.load("beverage-serving")
+    plan = scene.plan().plan
+    for name in ("L1#1", "L2#3", "l3#9"):
+        step = plan[name.upper()]
+        done = scene.execute(plan=plan, interventions=[f"after={name} cup2 LOCATION location8"])
+        assert done.episode.interventions and not done.episode.missed
+        before = [event.step.path for event in done.episode.events if event.end <= done.episode.interventions[0][1]]
+        assert before[-1][: len(step.path)] == step.path
+    with pytest.raises(KnowledgeError, match=r"a name from L1#0 to L3#"):
+        scene.execute(interventions=["after=L4#0 cup2 LOCATION location8"])
+
+
+def test_an_intervention_after_the_id_of_a_lower_step_is_told_the_name_of_the_step() -> None:
+    scene = confab.load("beverage-serving")
+    plan = scene.plan().plan
+    top, lower = {step.id for step in plan.steps}, plan.at_level(3)
+    step = next(step for step in lower if step.id not in top)
+    done = scene.execute(plan=plan, interventions=[f"after={step.id} cup2 LOCATION location8"])
+    assert f"{step.id} is the ID of L" in done.summary()
+    name = done.summary().rpartition("after=")[2].split()[0]
+    assert plan[name].id == step.id
 
 
 def test_an_execution_whose_goal_becomes_impossible_exits_with_1_and_the_reason() -> None:
