@@ -15,10 +15,12 @@ class Placed(Protocol):
     """A step, or the place of a step: a path in the tree and a level."""
 
     @property
-    def path(self) -> Path: ...
+    def path(self) -> Path:
+        """The position in the tree."""
 
     @property
-    def level(self) -> int: ...
+    def level(self) -> int:
+        """The level of the step."""
 
 
 class StepPosition(NamedTuple):

@@ -330,21 +330,18 @@ class SoftGoal(NamedTuple):
 class Forgone:
     """A soft goal that a plan leaves unmet, with the cost `weight` of leaving it unmet.
 
-    `price` is the additional cost of a plan that also meets the goal, or None if no such plan was found. `conditions` are the
-    conditions of a goal with alternatives or quantifiers.
+    `price` is the additional cost of a plan that also meets the goal, or None if no such plan was found; `why` then states why.
+    `conditions` are the conditions of a goal with alternatives or quantifiers.
     """
 
     fact: Fact
     weight: Fraction
     price: Fraction | None
     conditions: tuple[Condition, ...] = ()
+    why: str = ""
 
     def __str__(self) -> str:
-        more = (
-            "no plan that meets it and the other goals was found"
-            if self.price is None
-            else f"it would cost at most {written(self.price)} more"
-        )
+        more = self.why if self.price is None else f"it would cost at most {written(self.price)} more"
         goal = " and ".join(map(said, self.conditions))
         return f"{self.fact}{goal and f', which means {goal}'} (weight {written(self.weight)}; {more})"
 

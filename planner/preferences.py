@@ -314,9 +314,18 @@ class _SoftGoalChoices:
             searched = self.more(chosen, symbol) if outcome is first else None  # an extended plan has other unmet goals
             known = [one for one in (extra, searched) if one is not None]
             price = min(known).limit_denominator(PRECISION) if known else None
-            forgone.append(Forgone(fact, self.weights[symbol], price, wanted))
+            forgone.append(Forgone(fact, self.weights[symbol], price, wanted, self.why(chosen | {symbol})))
         bound = None if least is None else float(min(least - self.unmet(kept), cost))
         return self.task(kept), replace(outcome, forgone=tuple(forgone), bound=bound)
+
+    def why(self, other: Goals) -> str:
+        """Return why a choice has no plan: there is none, a limit ended the search, or the search found none."""
+        if (found := self.outcomes.get(other)) is not None and found.status is Status.UNSOLVABLE:
+            return "no plan meets it and the other goals"
+        none = "no plan that meets it and the other goals was found"
+        if found is None and self.ended:
+            return f"{none} before the time limit"
+        return f"{none}: {found.reason.text.split(';')[0]}" if found is not None and found.reason is not None else none
 
     def more(self, chosen: Goals, symbol: Symbol) -> Fraction | None:
         """Return the additional cost of meeting an unmet soft goal, as the difference of plans for which the same work was done."""

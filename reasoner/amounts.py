@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property, lru_cache
-from math import inf
+from math import ceil, floor, inf
 from typing import TypeAlias
 
 Number: TypeAlias = "Fraction | float"
@@ -220,6 +220,28 @@ def bounds_written(wanted: str) -> str:
         return "".join(written(limit) if sign == "=" else f"{sign}{written(limit)}" for sign, limit in found)
     both = {(one, limit) for sign, limit in found for one in (("<=", ">=") if sign == "=" else (sign,))}
     return ",".join(f"{sign}{written(limit)}" for sign, limit in sorted(both))
+
+
+def possible_bounds(wanted: str, quantity: Quantity) -> str:
+    """Return a goal value as amounts of a quantity can meet it, or an empty text if no amount within the bounds meets it.
+
+    >>> possible_bounds("<=5/2", Quantity(whole=True)), possible_bounds("<=-1/3", Quantity(least=Fraction(0)))
+    ('<=2', '')
+    """
+    limits = bounds(wanted)
+    if quantity.whole:
+        nearest = {"<": lambda x: ceil(x) - 1, "<=": floor, "=": Fraction, ">=": ceil, ">": lambda x: floor(x) + 1}
+        limits = tuple((sign if "=" in sign else f"{sign}=", Fraction(nearest[sign](limit))) for sign, limit in limits)
+    within = (
+        *limits,
+        *((">=", x) for x in [quantity.least] if x is not None),
+        *(("<=", x) for x in [quantity.most] if x is not None),
+    )
+    low = max(((limit, sign == ">") for sign, limit in within if "<" not in sign), default=(-inf, False))
+    high = min(((limit, sign != "<") for sign, limit in within if ">" not in sign), default=(inf, True))
+    possible = low[0] < high[0] or (low[0] == high[0] and not low[1] and high[1])
+    whole = not quantity.whole or all(limit.denominator == 1 for _, limit in limits)
+    return bounds_written(",".join(f"{sign}{limit}" for sign, limit in limits)) if possible and whole else ""
 
 
 def meets(value: str | None, wanted: str) -> bool:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from confab.reasoner.amounts import DECIMAL, Quantity, written
-from confab.reasoner.symbols import FALSE, TRUE, Constraint, Domain, Fact, Problem, State, Symbol
+from confab.reasoner.symbols import FALSE, TRUE, Constraint, Domain, Fact, Problem, State, Symbol, ValueCondition
 
 PLACE, HELD, POSITION = "perceive_place", "perceive_held", "perceive_hand_position"
 """Perceivers of an object's place, of the object in a hand, and of a hand's position."""
@@ -106,6 +106,18 @@ def refuse_derived(domain: Domain, facts: Iterable[Fact], cause: str = "") -> No
             raise ImpossibleStateError(f"{cause}: {text}" if cause else text)
 
 
+def earlier_states(domain: Domain, state: State) -> dict[Symbol, str]:
+    """Return what ``:onlyAfter`` remembers of states before a first state, in which remembered situation types are already true."""
+    found = {}
+    for constraint in domain.constraints.values():
+        if len(constraint.about) > 1 and (earlier := constraint.about[1]) in domain.remembers:
+            allowed = domain.rules[constraint.situation][0].conditions[1]
+            assert isinstance(allowed, ValueCondition)
+            true = (symbol for symbol, value in state.items() if symbol.situation == earlier and value == TRUE)
+            found.update({Symbol(allowed.situation, symbol.arguments): TRUE for symbol in true})
+    return found
+
+
 def violated(constraint: Constraint, arguments: Sequence[str]) -> str:
     """Return as text that a constraint is violated for individuals."""
     about = f" of {' and '.join(arguments)}" if arguments else ""
@@ -126,7 +138,7 @@ def values_at_fault(state: State, domain: Domain, declared: Container[str]) -> I
                     symbol,
                     f"{violated(constraint, symbol.arguments)} here",
                     "constraints hold in every state, from the first one on",
-                    f"change the facts from which {constraint.situation} follows, or its rule",
+                    _remedy(domain, constraint, symbol.arguments),
                 )
                 continue
             if name in domain.aggregates:
@@ -142,6 +154,20 @@ def values_at_fault(state: State, domain: Domain, declared: Container[str]) -> I
                     "an unknown name is read as a new individual",
                     "declare it, or correct the name",
                 )
+
+
+def _remedy(domain: Domain, constraint: Constraint, arguments: Sequence[str]) -> str:
+    """Return how to change a scene whose initial state violates a constraint."""
+    if len(constraint.about) < 2:
+        return f"change the facts from which {constraint.situation} follows, or its rule"
+    name, earlier = constraint.about
+    of = f"{earlier} of {' and '.join(arguments)}"
+    if earlier in domain.remembers:
+        return f"state {of} in the scene if it was true before, or change the facts from which {name} follows"
+    return (
+        f"if {of} was true before the scene begins, declare a situation type that c:remembers {earlier}, name it in c:onlyAfter, "
+        f"and state it in the scene; otherwise change the facts from which {name} follows"
+    )
 
 
 def _limits(value: str, quantity: Quantity) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 
 from confab.reasoner.symbols import (
     FALSE,
+    TRUE,
     AnyOf,
     Behavior,
     Condition,

@@ -32,8 +32,8 @@ class Intervention:
     """An intervention by a person during an episode.
 
     An intervention with `after` takes place when a step is finished: the step at the top of the tree with that ID (an int), the
-    step with that path (a tuple), or the step with a name such as ``L3#2`` in the tree of executed and remaining steps. An intervention with `at` takes place when the world's clock shows that number of
-    seconds, possibly while a primitive is running.
+    step with that path (a tuple), or the step with a name such as ``L3#2`` in the tree of executed and remaining steps. An
+    intervention with `at` takes place when the world's clock shows that number of seconds, possibly while a primitive is running.
 
     Attributes
     ----------

@@ -227,7 +227,9 @@ class _RunningEpisode:
         with suppress(WorldError):
             clock = self.world.seconds
         self.observer(
-            Event(what, self.whole(), frozenset(done), step, tuple(expected), surprises, text, clock, self.belief.problem)
+            Event(
+                what, self.whole(), frozenset(done), step, tuple(expected), surprises, text, clock, self.belief.problem
+            )
         )
 
     # --------------------------------------------------------------------------------------------------- acting

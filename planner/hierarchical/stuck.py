@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import replace
+from fractions import Fraction
 
 from confab.planner.hierarchical.call import Call
 from confab.planner.hierarchical.relevance import Asked, relevant_achievers
 from confab.planner.plan import Limits, Reason
 from confab.planner.transitions import Cell, arguments_of
-from confab.reasoner.amounts import bounds_written, meets
+from confab.reasoner.amounts import Quantity, meets, possible_bounds
 from confab.reasoner.limits import LimitError
-from confab.reasoner.symbols import Fact, Symbol
+from confab.reasoner.symbols import Domain, Fact, Symbol
 
 QUESTIONS, LOOKED, AMOUNTS = 160, 100_000, 3
 """Maximum number of examined values, maximum number of examined achievers, and maximum number of reported amounts."""
@@ -61,7 +63,17 @@ def missing_amounts(call: Call) -> Iterator[str]:
                 if situations[name].quantity is not None and not meets(call.table.now[name].get(key), wanted)
             }
         )
-    for (name, key), wanted in list(told.items())[:AMOUNTS]:
-        unit = situations[name].quantity.unit  # type: ignore[union-attr]
-        there = " ".join(filter(None, (call.table.now[name].get(key, ""), unit)))
-        yield f"{name} of {', '.join(arguments_of(key))}: {there} there, {bounds_written(wanted)} wanted"
+    found = [(cell, possible_bounds(wanted, _quantity(call.problem.domain, cell[0]))) for cell, wanted in told.items()]
+    for (name, key), wanted in sorted(found, key=lambda one: not one[1])[:AMOUNTS]:
+        there = " ".join(filter(None, (call.table.now[name].get(key, ""), _quantity(call.problem.domain, name).unit)))
+        needed = f"{wanted} wanted" if wanted else "no possible amount suffices"
+        yield f"{name} of {', '.join(arguments_of(key))}: {there} there, {needed}"
+
+
+def _quantity(domain: Domain, name: str) -> Quantity:
+    """Return the properties of the amounts of a situation type; a count is a whole number from 0 on."""
+    quantity = domain.situations[name].quantity
+    assert quantity is not None
+    aggregate = domain.aggregates.get(name)
+    counts = aggregate is not None and aggregate.function == "count"
+    return replace(quantity, whole=True, least=max(quantity.least or Fraction(0), Fraction(0))) if counts else quantity

@@ -12,7 +12,7 @@ from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.language import measured, walk
 from confab.reasoner.limits import checked
 from confab.reasoner.names import Names
-from confab.reasoner.possible import values_at_fault
+from confab.reasoner.possible import earlier_states, values_at_fault
 from confab.reasoner.reading.definitions import Definitions
 from confab.reasoner.reading.goals import check_arguments
 from confab.reasoner.reading.parts import Parts
@@ -193,6 +193,7 @@ def initial_state(
         kinds = domain.situations[symbol.situation].arguments
         if all(a in members.get(kind, ()) for a, kind in zip(symbol.arguments, kinds, strict=True)):
             initial[symbol] = TRUE  # symbols of unread individuals are omitted
+    initial |= earlier_states(domain, initial)
     return initial
 
 

@@ -421,7 +421,7 @@ def _situations(
         default = schema.values(iri, "defaultValue") or rest
         if iri in schema.pairs and default and schema.term(default[0]) == TRUE:
             raise KnowledgeError(
-                f"{name} holds only of the pairs that are stated, so it can't be true of every pair by c:restValue or c:defaultValue; "
+                f"{name} holds only of the pairs that are stated, so a rest value or default can't make it true of all; "
                 "drop the value, or declare the opposite situation type",
                 iri,
             )

@@ -77,6 +77,12 @@ def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
         wanted = f"wanted 'object SITUATION value'{example}{_not_one_fact(words) or meant}"
         raise KnowledgeError(f"'{fact}' is no fact; {wanted}")
     if about not in individuals:
+        if about in problem.classes and name in known:
+            node = f"a c:ValueCondition ; c:about :{about} ; c:situationType :{name} ; …"
+            raise KnowledgeError(
+                f"'{fact}': {about} is a class, and each fact is about one individual ({some_of(problem.classes[about])}); "
+                f"the goal that each {about} has this value is written in the scene: :task c:goal [ {node} ]"
+            )
         members = problem.classes.get(known[name].arguments[0], ()) if name in known else ()
         hint = f"{name} is of {some_of(members)}" if members else ""
         raise KnowledgeError(f"unknown individual '{about}' in '{fact}'{nearest(about, individuals, hint)}")
@@ -91,6 +97,13 @@ def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
     if len(rest) != len(situation.arguments):
         many = len(situation.arguments)
         after = "one word" if many == 1 else f"{many} words"
+        if len(rest) > many and rest[-1] == FALSE and not situation.boolean:
+            about = f"a c:ValueCondition ; c:about :{about} ; c:situationType :{name} ; c:value :{rest[-2]} ; c:negated true"
+            raise KnowledgeError(
+                f"'{fact}': only a situation that is true or false can be false; state another value of {name} "
+                f"({some_of(problem.classes.get(situation.range, ()))}), or write the goal that it isn't {rest[-2]} in the scene: "
+                f":task c:goal [ {about} ]"
+            )
         got = f"got {len(rest) or 'none'}{_not_one_fact(words)}"
         raise KnowledgeError(f"'{fact}': {name} needs {after} after it, a value last; {got}")
     if situation.quantity is not None:

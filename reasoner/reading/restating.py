@@ -16,7 +16,7 @@ from confab.reasoner.condition_nodes import Properties, equality_properties, sym
 from confab.reasoner.derivation import TASK
 from confab.reasoner.files import as_iri_part
 from confab.reasoner.graph.knowledge import BASE, SCENE, KnowledgeError, KnowledgeGraph, text
-from confab.reasoner.possible import ImpossibleStateError, refuse_derived, refuse_impossible
+from confab.reasoner.possible import ImpossibleStateError, earlier_states, refuse_derived, refuse_impossible
 from confab.reasoner.reading.frame import frame
 from confab.reasoner.reading.goals import symbols_of
 from confab.reasoner.reading.problem import Reading, members_of
@@ -47,7 +47,8 @@ def with_facts(graph: KnowledgeGraph, reading: Reading, facts: Sequence[Fact]) -
     initial = reading.problem.initial
     try:
         refuse_derived(reading.problem.domain, facts)
-        refuse_impossible(reading.problem, initial, {**initial, **{fact.symbol: fact.value for fact in facts}})
+        after = {**initial, **{fact.symbol: fact.value for fact in facts}}
+        refuse_impossible(reading.problem, initial, after | earlier_states(reading.problem.domain, after))
     except ImpossibleStateError as error:
         raise KnowledgeError(f"{', '.join(map(str, facts))}: {error}") from error
     copy = copied(graph)

@@ -376,6 +376,25 @@ def test_an_incomplete_fact_gets_an_example_of_its_own_scene(scene: confab.Scene
     assert str(told.value).rpartition("e.g. ")[2].strip("'") in scene.goals
 
 
+@pytest.mark.parametrize(
+    ("goal", "said"),
+    [
+        (
+            "cup2 LOCATION location8 false",
+            "c:about :cup2 ; c:situationType :LOCATION ; c:value :location8 ; c:negated true",
+        ),
+        ("Cup LOCATION location8", "Cup is a class, and each fact is about one individual (cup1, cup2"),
+    ],
+)
+def test_a_goal_that_excludes_a_value_or_is_about_a_class_is_refused_with_its_form_in_the_scene(
+    goal: str, said: str
+) -> None:
+    with pytest.raises(confab.KnowledgeError) as raised:
+        confab.load("beverage-serving").plan(goal)
+    assert said in str(raised.value)
+    assert ":task c:goal [" in str(raised.value)
+
+
 def test_explain_and_why_give_the_same_answer_and_the_error_on_an_unknown_step_lists_the_steps(
     result: confab.Result,
 ) -> None:

@@ -102,6 +102,32 @@ def test_the_checker_enforces_the_definitions_without_the_added_effects(old: str
     assert not carried_out(without_added_parts(problem), confab.load("tour-small").plan().plan)
 
 
+def test_a_scene_that_begins_after_the_earlier_state_states_what_is_remembered(tmp_path: Path) -> None:
+    ticket = DOMAIN.replace("c:onlyAfter :BUYING", "c:onlyAfter :TICKET").replace(
+        ":AT, :BUYING", ":AT, :TICKET, :BUYING"
+    )
+    ticket += ":TICKET a owl:Class, owl:NamedIndividual, c:SituationType ; c:remembers :BUYING ."
+    inside = SCENE.replace("d:at :station", "d:at :museum")
+    bought = (
+        inside + ":bought a owl:NamedIndividual, c:SituatedObjectInstance ; c:about :bus ; c:situationType d:TICKET ."
+    )
+    for domain, remedy in (
+        (DOMAIN, "declare a situation type that c:remembers BUYING"),
+        (ticket, "state TICKET of bus in"),
+    ):
+        with pytest.raises(KnowledgeError, match="IN_MUSEUM must be true only after") as raised:
+            _ = confab.load(written(tmp_path, "tour", domain, inside)).problem
+        assert remedy in str(raised.value) and ".before." not in str(raised.value)
+    begun = confab.load(written(tmp_path, "tour", ticket, bought))
+    for result in (begun.plan(), begun.plan(optimal=True), begun.plan(mode="paper")):
+        assert "office" not in [step.arguments[1] for step in result.plan.primitives]
+        assert not carried_out(without_added_parts(begun.problem), result.plan)
+    elsewhere = confab.load(written(tmp_path, "tour", ticket, SCENE))
+    assert "office" in [step.arguments[1] for step in elsewhere.plan().plan.primitives]
+    told = elsewhere.with_fact("bus TICKET true", "bus AT museum").plan()
+    assert "office" not in [step.arguments[1] for step in told.plan.primitives]
+
+
 def test_a_fact_that_holds_only_within_a_step_of_an_upper_level_is_remembered(tmp_path: Path) -> None:
     """The acid would be on the forklift twice, and only level 2 sees this. No behaviour carries the acid back to make room."""
     scenes = ontology.ROOT / "scenes"

@@ -17,7 +17,7 @@ import ontology
 from confab.cli import app
 from confab.interchange import outcome_json
 from confab.plan_call import CHOICE_WORK
-from confab.planner.plan import Limits, Outcome, Plan, Status
+from confab.planner.plan import Limits, Outcome, Plan, Reason, Status
 from confab.planner.plan_costs import cost_of
 from confab.planner.preferences import preferred
 from confab.planner.solve import Request, solve
@@ -111,7 +111,7 @@ def test_a_soft_goal_that_cannot_be_met_is_left_and_a_hard_one_makes_the_task_un
     heavy = written(tmp_path, "d:weight 2.0", "d:weight 200.0")
     outcome = confab.load(heavy).plan().outcome
     assert ("glass IN shop", None) in [(str(one.fact), one.price) for one in outcome.forgone]
-    assert "no plan that meets it and the other goals was found" in str(outcome.forgone[-1])
+    assert "no plan meets it and the other goals)" in str(outcome.forgone[-1])
     hard = confab.load(heavy).plan(goal="glass IN shop").outcome
     assert hard.status is Status.UNSOLVABLE
 
@@ -149,6 +149,27 @@ def test_the_choice_of_soft_goals_is_kept_if_its_proof_gives_up() -> None:
     same, unproved = preferred(problem, default, lambda task: Outcome(Status.GAVE_UP))
     assert (chosen, outcome.plan, outcome.forgone) == (same, unproved.plan, unproved.forgone)
     assert not unproved.proved
+
+
+def test_an_unmet_goal_states_whether_the_time_ended_or_the_search_found_no_plan() -> None:
+    problem = confab.load("wishes-small").problem
+
+    def late(task: Problem) -> Outcome:
+        if task.goal.keys() & problem.weights:
+            raise OutOfTimeError("the time is over")
+        return default(task)
+
+    none = Outcome(Status.GAVE_UP, reason=Reason("stopped at the limit: 9 expansions; 1 of 2 goals were reached"))
+    for search, why in (
+        (late, "was found before the time limit)"),
+        (
+            lambda task: none if task.goal.keys() & problem.weights else default(task),
+            "was found: stopped at the limit: 9 expansions)",
+        ),
+    ):
+        _, outcome = preferred(problem, search)
+        assert outcome.forgone
+        assert all(str(one).endswith(f"no plan that meets it and the other goals {why}") for one in outcome.forgone)
 
 
 def test_a_plan_that_leaves_a_goal_unmet_is_not_proved_cheapest_by_searches_that_gave_up() -> None:
