@@ -69,7 +69,7 @@ class Individuals:
                 )
         for kind in classes:
             parts.append(f"{{ ?s a owl:NamedIndividual ; a/rdfs:subClassOf* <{kind}> ; ?p ?o }}")
-        rows = []
+        rows, unnamed = list[Triple](), dict[str, list[Triple]]()
         links, nodes, numbers = self.links, self.schema.nodes, self.schema.numbers
         query = "SELECT ?s ?p ?o WHERE {\n  " + "\n  UNION ".join(parts) + " }"
         for s, p, o in checked(self.graph.solutions(query, SCENE), RECOGNISING):
@@ -80,8 +80,10 @@ class Individuals:
                 continue
             if not names and said in links and subject not in nodes:
                 link((s, p, o))  # this call raises an error for the triple
-            if isinstance(s, ox.NamedNode) and (names or (isinstance(o, ox.Literal) and said != TYPE)):
-                rows.append((subject, said, text(o)))
+            if names or (isinstance(o, ox.Literal) and said != TYPE):
+                of = rows if isinstance(s, ox.NamedNode) else unnamed.setdefault(subject, [])
+                of.append((subject, said, text(o)))
+        rows += [row for node in unnamed.values() if any(row[1:] == (TYPE, FACT) for row in node) for row in node]
         self.triples.update(dict.fromkeys(rows))
         kinds = self.below(classes)
         self.seen |= individuals | {s for s, p, o in rows if p == TYPE and o in kinds}

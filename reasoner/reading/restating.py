@@ -61,10 +61,12 @@ def with_facts(graph: KnowledgeGraph, reading: Reading, facts: Sequence[Fact]) -
             _remove(copy, about, ox.NamedNode(prop), ox.NamedNode(iri(symbol.arguments[1])) if pair else None)
         for node in _about(copy, reading, symbol):
             _remove(copy, node)
-        copy.extend("asserted", said(reading, fact, prop, ox.BlankNode()))
+        name = as_iri_part(".".join(("fact", *symbol.arguments, symbol.situation)))
+        node = ox.NamedNode(f"{graph.scene.rstrip('#/')}#{name}")
+        copy.extend("asserted", said(reading, fact, prop, node))
         if fact.value == FALSE and reading.problem.domain.situations[symbol.situation].default == TRUE:
             stated = symbol_properties(iri(symbol.situation), [*map(iri, symbol.arguments)], CORE + FALSE)
-            copy.extend("asserted", triples(ox.BlankNode(), {TYPE: [CORE + "SituatedObjectInstance"], **stated}))
+            copy.extend("asserted", triples(node, {TYPE: [CORE + "SituatedObjectInstance"], **stated}))
     return copy
 
 
@@ -175,7 +177,7 @@ def value_properties(graph: KnowledgeGraph) -> dict[str, str]:
     return {text(situation): text(prop) for situation, prop in graph.select(VALUE_PROPERTIES, SCENE)}
 
 
-def said(reading: Reading, fact: Fact, prop: str | None, node: ox.BlankNode) -> Iterator[ox.Triple]:
+def said(reading: Reading, fact: Fact, prop: str | None, node: ox.BlankNode | ox.NamedNode) -> Iterator[ox.Triple]:
     """Yield the triples of a fact: one triple with its value property if possible, otherwise the triples of a node.
 
     A false fact has no triples.

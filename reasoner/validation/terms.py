@@ -17,7 +17,7 @@ from confab.reasoner.names import local_name, nearest
 from confab.reasoner.reading.goals import some_of
 from confab.reasoner.reading.swrl import SWRL
 from confab.reasoner.validation.case import Case, Fault
-from confab.reasoner.vocabulary import MEMORY, OWL, RDF, RDFS, XSD
+from confab.reasoner.vocabulary import CORE, MEMORY, OWL, RDF, RDFS, XSD
 
 BUILT_IN = (OWL, RDF, RDFS, XSD, SWRL, SWRL.replace("swrl#", "swrlb#"), MEMORY)
 ATOMS = (SWRL + "argument1", SWRL + "argument2")
@@ -74,8 +74,14 @@ def _undeclared(case: Case) -> Iterator[tuple[object, str, str, set[str]]]:
 
 
 def misread(case: Case) -> set[str]:
-    """Return the nodes that mention undeclared terms or relative IRIs, directly or through another node."""
+    """Return the nodes that mention undeclared terms, relative IRIs or owl:Thing, directly or through another node."""
     first = {subject.value for subject, *_ in _undeclared(case) if isinstance(subject, ox.NamedNode)} | case.relative
+    first |= {
+        triple.subject.value
+        for triple in case.triples
+        if triple.predicate.value == CORE + "termType" and triple.object == ox.NamedNode(OWL + "Thing")
+        if isinstance(triple.subject, ox.NamedNode)
+    }
     return first | {
         triple.subject.value
         for triple in case.triples

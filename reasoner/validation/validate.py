@@ -56,6 +56,8 @@ CONSEQUENCES = {
     "value-outside-range",
     "effect-without-situation-type",
     "condition-without-situation-type",
+    "term-type-is-no-class",
+    "term-type-is-no-individual",
     "object-without-shape",
     "relation-outside-domain",
     "relation-outside-range",
@@ -63,7 +65,7 @@ CONSEQUENCES = {
     "tuple-outside-class",
     "not-a-named-individual",
 }
-"""Rules that are skipped for nodes that mention an undeclared term, because the faults may be consequences of this term."""
+"""Rules that are skipped for nodes that mention an undeclared term or owl:Thing, because the faults may be its consequences."""
 SAID_BETTER = {"effect-without-situation-type": "effect-on-definition"}
 """A mapping of a check to a more precise check. The first check skips each node about which the second check has a finding."""
 WRONG_FACTS = {"fact-outside-range", "fact-outside-domain", "fact-without-situation-type", "clashing-values"}

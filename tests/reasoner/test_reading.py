@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+import confab
 from confab.reasoner.graph.knowledge import KnowledgeError, load
 from confab.reasoner.reading.goals import parse_fact, with_goals
 from confab.reasoner.reading.problem import Reading, read
@@ -22,6 +23,54 @@ SCENE = """
 @pytest.fixture(scope="module")
 def serving() -> Reading:
     return read(load("beverage-serving"))
+
+
+REEFERS = """@prefix : <https://example.org/reefers#> . @prefix c: <https://w3id.org/confab/core#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> . @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+<https://example.org/reefers> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> .
+:Reefer a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object ; c:hasSituationType :IN, :PLUGGED .
+:Place a owl:Class, owl:NamedIndividual ; rdfs:subClassOf :IN .
+:IN a owl:Class, owl:NamedIndividual, c:SituationType ; c:valueProperty :in .
+:in a owl:ObjectProperty, owl:FunctionalProperty, owl:NamedIndividual ; rdfs:domain :Reefer ; rdfs:range :IN .
+:PLUGGED a owl:Class, owl:NamedIndividual, c:SituationType ; c:fromLevel 2 ; c:restValue c:true .
+:L1_BRING a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 1 ; c:update
+  "INSERT { ?r :in ?to } WHERE { ?r a :Reefer . ?to a :Place . ?r :in ?from FILTER(?from != ?to) }" .
+:L2_BRING a owl:NamedIndividual, c:Behavior ; c:level 2 ; c:index 1 ; c:update
+  "INSERT { ?r :in ?to } WHERE { ?r a :Reefer . ?to a :Place . ?r :in ?from ; :PLUGGED false FILTER(?from != ?to) }" .
+:L2_PLUG a owl:NamedIndividual, c:Behavior ; c:level 2 ; c:index 2 ; c:update
+  "INSERT { ?r :PLUGGED true } WHERE { ?r a :Reefer ; :PLUGGED false }" .
+:L2_UNPLUG a owl:NamedIndividual, c:Behavior ; c:level 2 ; c:index 3 ; c:update
+  "INSERT { ?r :PLUGGED false } WHERE { ?r a :Reefer ; :PLUGGED true }" .
+:quay a owl:NamedIndividual, :Place ; c:index 1 . :ship a owl:NamedIndividual, :Place ; c:index 2 .
+:r a owl:NamedIndividual, :Reefer ; c:index 3 ; :in :quay . :s a owl:NamedIndividual, :Reefer ; c:index 4 ; :in :quay .
+:s.off a owl:NamedIndividual, c:SituatedObjectInstance ; c:about :s ; c:situationType :PLUGGED ; c:value c:false .
+[ a owl:AllDifferent ; owl:distinctMembers ( :quay :ship :r :s ) ] .
+:task a owl:NamedIndividual, c:Task ; c:goal :task.r .
+:task.r a owl:NamedIndividual, c:ValueCondition ; c:about :r ; c:situationType :IN ; c:value :ship ."""
+
+
+def test_a_situation_that_rests_true_is_true_of_an_object_without_a_fact_in_every_mode_query_and_export(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "reefers.ttl").write_text(REEFERS)
+    scene = confab.load(tmp_path / "reefers.ttl")
+    assert [fact for fact in scene.facts if "PLUGGED" in fact] == ["r PLUGGED true"]
+    assert [one.behavior for one in scene.affordances("r") if "PLUG" in str(one.behavior)] == ["L2_UNPLUG"]
+    for result in (scene.plan(), scene.plan(mode="paper"), scene.plan(optimal=True)):
+        assert [step.behavior for step in result.plan.primitives] == ["L2_UNPLUG", "L2_BRING", "L2_PLUG"]
+    off = scene.with_fact("r PLUGGED false")
+    assert not [fact for fact in off.facts if "PLUGGED" in fact]
+    assert [step.behavior for step in off.plan().plan.primitives] == ["L2_BRING"]
+    assert [f for f in off.with_fact("r PLUGGED true").facts if "PLUGGED" in f] == ["r PLUGGED true"]
+
+
+@pytest.mark.parametrize("node", [":s.off a owl:NamedIndividual,", "[] a"])
+def test_a_stated_fact_is_read_by_every_mode_whether_its_node_has_a_name_or_not(node: str, tmp_path: Path) -> None:
+    (tmp_path / "reefers.ttl").write_text(REEFERS.replace(":s.off a owl:NamedIndividual,", node))
+    scene = confab.load(tmp_path / "reefers.ttl").without_goal().with_goal("s IN ship")
+    for changed, steps in ((scene, 1), (scene.with_fact("s PLUGGED true"), 3)):
+        for result in (changed.plan(), changed.plan(mode="paper"), changed.plan(optimal=True)):
+            assert len(result.plan.primitives) == steps
 
 
 def test_every_situated_object_has_the_value_that_the_scene_states(serving: Reading) -> None:
