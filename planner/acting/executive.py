@@ -41,7 +41,6 @@ from confab.planner.acting.repair import difference, repair_or_replan, replan, v
 from confab.planner.acting.retries import DEFAULT, Retries, RetryPolicy
 from confab.planner.acting.unreached import blamed, blocked, with_discoveries
 from confab.planner.acting.world import INTERRUPTED, WITHOUT_EFFECT, Guarded, Verdict, World, WorldError, WorldReport
-from confab.planner.finding import numbers
 from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, renumbered
 from confab.planner.timed.activities import InapplicableError, StepSimulation
@@ -216,6 +215,12 @@ class _RunningEpisode:
     def whole(self) -> Plan:
         """Return the tree of the executed and the remaining steps."""
         return Plan(tree_of({**self.record.done, **{step.path: step for step in Plan(self.agenda.steps).walk()}}))
+
+    def path_of(self, name: str) -> tuple[int, ...] | None:
+        """Return the path of the step with a name such as ``L3#2`` in the whole tree, or None if there is no such step."""
+        with suppress(LookupError):
+            return self.whole()[name].path
+        return None
 
     def say(self, what: str, step: Step | None = None, expected: Iterable[Fact] = (), text: str = "") -> None:
         """Notify the observer of an event, if the episode has an observer."""
@@ -411,8 +416,8 @@ class _RunningEpisode:
         gone = {step.path: step for step in (*self.record.done.values(), *Plan(steps).walk())}
         gone = {path: step for path, step in gone.items() if path not in left}
         ids = {one.id for step in gone.values() if len(step.path) == 1 for one in step.together}
-        names = {number for path, number in numbers(self.whole().walk()).items() if path in gone}
-        due = [i for i in self.waiting if i.after in {*ids, *gone, *names}]
+        named = {i.after for i in self.waiting if isinstance(i.after, str) and self.path_of(i.after) in gone}
+        due = [i for i in self.waiting if i.after in {*ids, *gone, *named}]
         return due + [i for i in self.waiting if i.at is not None and i.at <= self.world.seconds]
 
     def note_what_happened_by_the_clock(self) -> None:

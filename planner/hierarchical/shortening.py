@@ -2,7 +2,7 @@
 
 The first method plans the goals again in other orders, and reuses known refinements. The second method replaces consecutive steps
 of a level by cheaper steps (`confab.planner.hierarchical.windows`). The third method removes steps whose changes cancel out
-(`confab.planner.hierarchical.detours`).
+(`confab.planner.hierarchical.detours`). The primitives after the first state with all goals are always dropped.
 
 Other orders are tried only if the plan moves an object away or has many steps per goal. The second method, which may refine several
 steps together, is used only if a shorter plan is likely. The cheapest plan is kept; among equally cheap plans, the plan with the
@@ -12,7 +12,7 @@ becomes much cheaper.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
@@ -22,7 +22,8 @@ from time import perf_counter
 
 from confab.planner.hierarchical.agenda import Agenda
 from confab.planner.hierarchical.call import Call, as_refined, fresh_call
-from confab.planner.hierarchical.detours import without_detours
+from confab.planner.hierarchical.detours import parts, without_detours
+from confab.planner.hierarchical.refinement import RefinedStep
 from confab.planner.hierarchical.windows import improves, lower_bound, primitives, regroupings, windowed
 from confab.planner.plan import Plan
 from confab.planner.plan_costs import compared
@@ -50,8 +51,10 @@ MANY = 1.25
 
 def shortened(call: Call, improve: int, leave_levels: bool, advised: Callable[[Call], None]) -> Plan:
     """Return the plan of a call, shortened with work proportional to `improve`."""
+    drop_idle_end(call)
     with suppress(LimitError):  # at a limit, the current plan is kept
         shorten(call, improve, leave_levels, advised)
+    drop_idle_end(call)
     plan = call.tree()
     if all(step.level == call.program.levels[0] for step in plan.steps):
         call.given_up.clear()  # all steps of the plan are of the first level, so no level was given up
@@ -209,6 +212,42 @@ def neighbours(order: list[Cell], random: Random) -> Iterator[list[Cell]]:
         to = random.randrange(len(other) + 1)
         other[to:to] = moved
         yield other
+
+
+def drop_idle_end(call: Call) -> None:
+    """Drop the primitives after the first state in which all goals hold and all symbols are at rest, if the other steps remain.
+
+    The search may leave such primitives if the steps of a goal also achieve a later goal. A step without its last primitives
+    remains if it still has its effect.
+    """
+    table, level = call.table, call.program.levels[-1]
+
+    def ended() -> bool:
+        return all(map(call.met, call.goal)) and not any(map(call.restless, call.program.levels))
+
+    table.undo(0)
+    all_parts, many = [part for step in call.steps for part in parts(step, level)], 0
+    while many < len(all_parts) and not ended():
+        call.refiner.replay(all_parts[many])
+        many += 1
+    table.undo(0)
+    if many < len(all_parts):
+        steps = [call.refiner.replay_checked(step) for step in _first(call.steps, many, level)]
+        if None not in steps and ended():
+            call.steps = [step for step in steps if step is not None]
+        table.undo(0)
+
+
+def _first(steps: Sequence[RefinedStep], many: int, level: int) -> list[RefinedStep]:
+    """Return the first steps, with a number of parts on a level in all; the last step may lose parts."""
+    found = list[RefinedStep]()
+    for step in steps:
+        own = len([*parts(step, level)])
+        if many <= 0:
+            break
+        found.append(step if own <= many else step._replace(steps=tuple(_first(step.steps, many, level))))
+        many -= own
+    return found
 
 
 def drop_detours(call: Call, level: int) -> bool:

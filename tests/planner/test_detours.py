@@ -5,6 +5,7 @@ import pytest
 from confab.planner.hierarchical.call import Call, compiled
 from confab.planner.hierarchical.detours import without_detours
 from confab.planner.hierarchical.planner import plan
+from confab.planner.hierarchical.shortening import shortened
 from confab.planner.levels import levels_left
 from confab.planner.validation import validate
 from confab.reasoner.symbols import Problem, SituationType
@@ -66,3 +67,27 @@ def test_pairs_of_steps_that_cancel_each_other_are_removed_from_the_inside_out(i
     assert [step.behavior for step in left] == ["UNLOCK", "OPEN", *["TAKE"] * items, "SHUT", "LOCK"]
     call.replace_steps(left)
     assert call.table.state() == end
+
+
+@pytest.mark.parametrize("inside", [True, False])
+def test_primitives_after_the_first_state_with_all_goals_are_dropped_even_without_time(inside: bool) -> None:
+    problem = world(
+        [SituationType("AT", ("Item",), "Place"), SituationType("VAN", ("Van",), "Place", level=2)],
+        [
+            behavior("BRING", 1, "?i:Item ?p:Place", [lacks("AT", "?i", "?p")], [becomes("AT", "?i", "?p")]),
+            behavior("CARRY", 2, "?i:Item ?p:Place", [has("VAN", "van", "?p")], [becomes("AT", "?i", "?p")]),
+            behavior("DRIVE", 2, "?p:Place", [lacks("VAN", "van", "?p")], [becomes("VAN", "van", "?p")]),
+        ],
+        {"Item": ("item",), "Van": ("van",), "Place": ("north", "south", "west")},
+        {"AT item": "north", "VAN van": "north"},
+        {"AT item": "south"},
+    )  # fmt: skip
+    call = Call(problem, compiled(problem), None, 1000)
+    step, idle = call.refiner.do(1, "BRING", ("item", "south")), call.refiner.do(2, "DRIVE", ("west",))
+    assert step is not None
+    assert idle is not None
+    call.steps = [step._replace(steps=(*step.steps, idle))] if inside else [step, idle]
+    call.space.deadline = 0.0  # no time is left for shortening
+    shortest = shortened(call, 1, True, lambda call: None)
+    assert validate(problem, shortest) == []
+    assert shortest.length == {1: 1, 2: 2}
