@@ -411,7 +411,7 @@ class _Draft(Vocabulary):
             self.situations[name] = SituationType(name, arguments, "Truth", level, TRUE, TRUE, boolean=True)
         for row in product(*(self.classes[of] for of in arguments)):
             if rest == TRUE or self.chance(0.05 if rest == FALSE else 0.3):
-                self.initial[Symbol(name, row)] = FALSE if rest == TRUE and self.chance(0.1) else TRUE
+                self.initial[Symbol(name, row)] = TRUE
 
     def with_values(self, name: str, arguments: tuple[str, ...], level: int) -> None:
         """Draw a situation type with one value per object."""
