@@ -65,7 +65,7 @@ KEPT, KEPT_IN_TIME = 0.1, 0.3
 SHORTENING = 0.7
 """The share of the remaining time in which a plan with a schedule is shortened; the rest is for the new schedule."""
 CHOICE_WORK = 1_000_000
-"""Maximum work of the search of a plan for one choice of soft goals, if there is no time limit.
+"""Maximum work of the search of a plan for one choice of soft goals.
 
 After more work for another choice, the maximum is twice that work.
 """
@@ -120,9 +120,9 @@ class Found(NamedTuple):
 class Searching(NamedTuple):
     """The mode of a search, the share of the time limit that the search may use, and the work for a shorter plan.
 
-    By default, the work for a shorter plan depends on the time limit. If `most_work` is given, it limits the work of a search
-    without a time limit, and the search uses no engine. `first` is an outcome whose plan is extended or shortened instead of
-    searching. Shortening keeps only plans that `accepts` allows.
+    By default, the work for a shorter plan depends on the time limit. If `most_work` is given, it limits the work of the search,
+    and the search uses no engine. `first` is an outcome whose plan is extended or shortened instead of searching. Shortening keeps
+    only plans that `accepts` allows.
     """
 
     mode: str
@@ -297,15 +297,15 @@ def searched(task: PlanningTask, problem: Problem) -> tuple[Problem, Outcome]:
         return replace(found, status=same.status, plan=same.plan, reason=same.reason, left=same.left, cost=same.cost)
 
     def choose(choice: Problem) -> Outcome:
-        limit = "half of the time limit, which is for proofs"
+        limit = "half of the time limit, which is for a cheaper plan or proofs"
         found = search_in_time(task, comparing(choice), (seconds or 0.0) / 2, limit, choice)
         nonlocal worked
         worked = max(worked, found.effort if found.plan is not None else 0)
         return in_its_times(choice, found)
 
-    def shorten(choice: Problem, found: Outcome, work: Shortening) -> Outcome:
-        how = Searching(mode) if work == "once" else comparing(choice)
-        return search(task, choice, how._replace(shortening=work, first=found))
+    def shorten(choice: Problem, found: Outcome, briefly: bool) -> Outcome:
+        how = comparing(choice)._replace(shortening="brief") if briefly else Searching(mode)
+        return search(task, choice, how._replace(first=found))
 
     def extended(choice: Problem, found: Outcome) -> Outcome:
         how = bounded._replace(first=found)
@@ -313,7 +313,7 @@ def searched(task: PlanningTask, problem: Problem) -> tuple[Problem, Outcome]:
 
     fixed = task.options.by_engine or mode == "paper"
     extend = None if fixed else extended
-    if seconds is None and mode != "optimal":
+    if mode != "optimal":
         chosen, outcome = preferred(alike, choose, shorten=None if fixed else shorten, extend=extend)
     else:
         least = max(kept, 2 * task.checking)
@@ -374,12 +374,7 @@ def own_request(task: PlanningTask, problem: Problem, how: Searching, engines: b
     return Request(
         task.with_measured_durations(with_unit_costs(problem) if options.minimise == "steps" else problem),
         how.mode,
-        Limits(
-            seconds=seconds,
-            work=how.most_work if seconds is None else inf,
-            shortening=shortening,
-            accepts=how.accepts,
-        ),
+        Limits(seconds=seconds, work=how.most_work, shortening=shortening, accepts=how.accepts),
         None if memory is None or isinstance(memory, Links) else memory.advisor,
         links,
         task.grounds,

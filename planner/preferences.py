@@ -7,8 +7,8 @@ a small total cost.
 First, `preferred` plans for the hard goals alone. If there is no plan for the hard goals, the task has no plan, unless a soft goal
 replaces a rest value. Second, it plans for all soft goals together. From either choice, it adds or drops one soft goal at a time,
 the heaviest first, until no such change makes the choice cheaper. These plans only compare choices, so they needn't be shortened.
-If `shorten` is given, `preferred` then shortens the plans of the few cheapest choices with little work, and the plan of the best
-of them with the full work. If `prove` is given, it computes a lower bound for the choice and for all choices that could be
+If `shorten` is given, `preferred` then shortens the plans of the few cheapest choices with little work, and in the end the plan of
+the best of them with the full work. If `prove` is given, it computes a lower bound for the choice and for all choices that could be
 cheaper. Choices with a smaller sum of unmet weights come first.
 
 If `extend` is given, a choice for which the search gave up gets the plan of a choice with fewer goals, extended by steps for the
@@ -26,7 +26,7 @@ from itertools import chain, islice
 from math import inf
 from typing import TypeAlias
 
-from confab.planner.plan import Forgone, Outcome, Plan, Shortening, Status
+from confab.planner.plan import Forgone, Outcome, Plan, Status
 from confab.planner.plan_costs import cost_of
 from confab.planner.validation import unmet_goals
 from confab.reasoner.derivation import conditions_of_goal
@@ -34,7 +34,7 @@ from confab.reasoner.limits import LimitError, OutOfTimeError, overtime
 from confab.reasoner.symbols import Fact, Problem, Symbol
 
 PlanSearch: TypeAlias = "Callable[[Problem], Outcome]"
-Shortener: TypeAlias = "Callable[[Problem, Outcome, Shortening], Outcome]"
+Shortener: TypeAlias = "Callable[[Problem, Outcome, bool], Outcome]"
 Extender: TypeAlias = "Callable[[Problem, Outcome], Outcome]"
 Goals: TypeAlias = frozenset[Symbol]
 MOST_CHOICES = 200
@@ -64,7 +64,7 @@ def preferred(
         choice, reduced by the weights of the unmet soft goals. It is negative if a choice with a smaller total cost than these
         weights isn't excluded.
     shorten : callable, optional
-        Function that shortens the plan of an outcome of `search`.
+        Function that shortens the plan of an outcome of `search`, if its last argument is true with little work.
     extend : callable, optional
         Function that plans for the goals of a problem by additional steps after the plan of an outcome, or gives up.
     """
@@ -88,7 +88,7 @@ def preferred(
     if shorten is None:
         return choices.result(best, choices.outcome(best))
     best = choices.shortened([best, *others[: SHORTENED - 1]], shorten)
-    return choices.result(best, shorten(choices.task(best), choices.briefly[best], "once"), shorten=shorten)
+    return choices.result(best, choices.briefly[best], shorten=shorten)
 
 
 class _SoftGoalChoices:
@@ -250,7 +250,7 @@ class _SoftGoalChoices:
         if len(some) == 1:
             self.briefly = dict.fromkeys(some, self.outcome(some[0]))
             return some[0]
-        self.briefly = {kept: shorten(self.task(kept), self.outcome(kept), "brief") for kept in some}
+        self.briefly = {kept: shorten(self.task(kept), self.outcome(kept), True) for kept in some}
         return min(some, key=lambda kept: self.price(self.briefly[kept]) + self.unmet(kept))
 
     def cheapest(self, best: Goals) -> tuple[Goals, Fraction]:
@@ -289,10 +289,9 @@ class _SoftGoalChoices:
     ) -> tuple[Problem, Outcome]:
         """Return the task of a choice, and the outcome with the unmet soft goals and the additional cost of meeting each goal.
 
-        As long as some steps for an unmet soft goal cost less than its weight, they extend the plan of the outcome. `least` is a
-        lower bound on the total cost of any choice.
+        As long as some steps for an unmet soft goal cost less than its weight, they extend the plan of the outcome. Finally,
+        `shorten` shortens the plan. `least` is a lower bound on the total cost of any choice.
         """
-        first = outcome
         longer: Outcome | None = outcome
         while longer is not None:
             outcome, longer, more = longer, None, dict[Symbol, Fraction | None]()
@@ -304,14 +303,15 @@ class _SoftGoalChoices:
                     other = self.extended(kept | {symbol}, outcome)
                     more[symbol] = None if other is None else self.price(other) - self.price(outcome)
                     if other is not None and self.price(other) - self.price(outcome) < self.weights[symbol]:
-                        kept |= {symbol}
-                        longer = other if shorten is None else shorten(self.task(kept), other, "once")
+                        longer = other
                         break
+        if shorten is not None:
+            outcome = shorten(self.task(kept), outcome, False)
         cost, forgone = self.price(outcome), []
         for symbol, extra in more.items():
             fact = Fact(symbol, self.problem.goal[symbol])
             wanted = conditions_of_goal(self.problem.domain, symbol)
-            searched = self.more(chosen, symbol) if outcome is first else None  # an extended plan has other unmet goals
+            searched = self.more(chosen, symbol) if kept == chosen else None  # an extended plan has other unmet goals
             known = [one for one in (extra, searched) if one is not None]
             price = min(known).limit_denominator(PRECISION) if known else None
             forgone.append(Forgone(fact, self.weights[symbol], price, wanted, self.why(chosen | {symbol})))

@@ -214,8 +214,8 @@ def _proof(problem: Problem, states: int, deadline: float | None) -> UnsolvableE
             task = proved(problem, problem.domain.levels[-1], deadline)
         except UnsolvableError as proof:
             return proof
-        reason = None if isinstance(task, Reason) else exhausted(task, states, deadline)
-        return None if reason is None else UnsolvableError(reason)
+        result = None if isinstance(task, Reason) else exhausted(task, states, deadline)
+        return UnsolvableError(result) if isinstance(result, Reason) else None
     return None
 
 

@@ -566,7 +566,7 @@ class Judge:
         try:
             task = proved(problem, problem.domain.levels[-1])
             states = None if isinstance(task, Reason) else exhausted(task, MOST)
-            proof = None if states is None else states.text
+            proof = states.text if isinstance(states, Reason) else None
         except UnsolvableError as error:
             proof = error.reason.text
         if proof is not None and self.surely is not None:

@@ -29,7 +29,8 @@ from confab.planner.hierarchical.search_budget import (
     SearchBudget,
     scopes,
 )
-from confab.planner.hierarchical.unsolvability import Proofs
+from confab.planner.hierarchical.unsolvability import Proofs, ignored
+from confab.planner.plan import Plan
 from confab.planner.transitions import Cell, arguments_of
 from confab.reasoner.limits import LimitError
 from confab.reasoner.symbols import Condition
@@ -53,6 +54,9 @@ class Agenda:
     below : function, optional
         Function that replaces all steps by the steps of a brief search of the lowest level as a whole; it returns whether all goals
         hold.
+    found : function of a plan, optional
+        Function that is called with a cheapest plan of the lowest level if an attempt to prove that there is no plan finds one; it
+        returns whether this is a plan of the call's problem.
     """
 
     call: Call
@@ -60,6 +64,7 @@ class Agenda:
     quickly: bool = False
     trial: bool = False
     below: Callable[[], bool] | None = None
+    found: Callable[[Plan], bool] = ignored
     _open: deque[Cell] = field(default_factory=deque)
     _asleep: dict[Cell, None] = field(default_factory=dict)
     _waiting: dict[Cell, list[Cell]] = field(default_factory=dict)
@@ -70,7 +75,7 @@ class Agenda:
 
     def __post_init__(self) -> None:
         """Prepare the attempts to prove that there is no plan; a trial makes none."""
-        self.proofs = Proofs(self.call, wanted=not self.trial)
+        self.proofs = Proofs(self.call, not self.trial, self.found)
 
     # ------------------------------------------------------------------------------------------------- one goal after another
 
@@ -279,10 +284,11 @@ class Agenda:
         try:
             return self.all_goals(level)
         except LimitError:
-            if not space.most_work < space.worked <= most:
+            if self.proofs.solved or not space.most_work < space.worked <= most:
                 raise
         finally:
-            space.most_work = most
+            if not self.proofs.solved:
+                space.most_work = most
         call.replace_steps(())
         del self._tried[level]
         return self.below() or self.all_goals(level)

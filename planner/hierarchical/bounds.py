@@ -47,7 +47,8 @@ def plan(
     ----------
     problem : Problem
     limits : Limits
-        Maximum number of expansions of each A* search, and the time limit. The whole time is used unless optimality is proved.
+        Maximum number of expansions of each A* search, and the time limit. The whole time is used unless optimality is proved, half
+        of it for A*.
     using : Compiled, optional
 
     Returns
@@ -59,7 +60,8 @@ def plan(
     deadline = limits.end(SEARCHING)
     with suppress(LimitError):
         using = using or compiled(problem)
-    best = hierarchical_plan(problem, limits=replace(limits.until(deadline), shortening="repeated"), using=using)
+    half = None if deadline is None else (begin + deadline) / 2
+    best = hierarchical_plan(problem, limits=replace(limits.until(half), shortening="repeated"), using=using)
     if best.status is Status.UNSOLVABLE:
         return best
     lower, found = _proved(problem, best, limits, deadline)

@@ -32,7 +32,8 @@ from confab.planner.hierarchical.scope import BITS, MAKING
 from confab.planner.hierarchical.shortening import ORDERS, shortened
 from confab.planner.hierarchical.unsolvability import FINALLY
 from confab.planner.hierarchical.windows import regroupings
-from confab.planner.plan import Limits, Outcome, Reason, Status, UnsolvableError, paused_collection
+from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, UnsolvableError, paused_collection
+from confab.planner.plan_costs import cost_of
 from confab.planner.transitions import arguments_of
 from confab.planner.validation import validate
 from confab.reasoner.limits import LimitError, current, within
@@ -133,7 +134,10 @@ def _plan(
     call.accepts = limits.accepts or call.accepts
     advised(call)
     levels = call.program.levels if leave_levels else call.program.levels[:1]
-    agenda = Agenda(call, levels, below=partial(below, call, limits) if leave_levels else None)
+    cheapest = LowestLevelPlan(call)
+    agenda = Agenda(call, levels)
+    if leave_levels:
+        agenda = Agenda(call, levels, below=partial(below, call, limits), found=cheapest.keep)
     try:
         resumed = first is not None and call.resume(first)
         more = resumed and call.kept.keys() != call.goal.keys()
@@ -159,11 +163,11 @@ def _plan(
                     call, f"a goal that level {levels[0]} doesn't see requires steps below it, and {NOT_LEFT}"
                 )
             return call.outcome(Status.SOLVED, plan)
-        return last_resort(agenda, limits, leave_levels)
+        return cheapest.outcome() or last_resort(agenda, limits, leave_levels)
     except UnsolvableError as proof:
         return replace(call.outcome(Status.UNSOLVABLE, reason=proof.reason), certificate=proof.certificate)
     except LimitError as limit:
-        return given_up(call, f"stopped at the limit: {limit}")
+        return cheapest.outcome() or given_up(call, f"stopped at the limit: {limit}")
 
 
 def before_the_check(call: Call, until: float | None) -> float | None:
@@ -189,6 +193,46 @@ def below(call: Call, limits: Limits) -> bool:
     call.steps = as_refined(call, plan.steps)
     call.replace_steps(call.steps)
     return all(map(call.met, call.goal))
+
+
+class LowestLevelPlan:
+    """A cheapest plan of the lowest level, found by the examination of its states during planning goal by goal."""
+
+    def __init__(self, call: Call) -> None:
+        self.call = call
+        self.plan: Plan | None = None
+        self.cost = 0.0
+
+    def keep(self, plan: Plan) -> bool:
+        """Keep a plan, grouped under steps of the levels above; return whether it is a plan of the call's problem.
+
+        Planning goal by goal ends at once if all steps have been grouped under steps of the first level; otherwise it goes on with
+        as much work as it has done.
+
+        Raises
+        ------
+        LimitError
+            All steps have been grouped.
+        """
+        call, space = self.call, self.call.space
+        plans = regroupings(call.problem, plan, call.program.levels[-1], call.using)
+        self.plan = next((one for one in plans if not validate(call.problem, one)), None)
+        if self.plan is None:
+            return False
+        self.cost = cost_of(call.problem, self.plan)
+        space.most_work = min(space.most_work, 2 * space.worked)
+        if all(step.level == call.program.levels[0] for step in self.plan.steps):
+            space.most_work = 0
+            raise LimitError("a cheapest plan was found")
+        return True
+
+    def outcome(self) -> Outcome | None:
+        """Return the outcome of the call with the plan, or None without a plan."""
+        if self.plan is None:
+            return None
+        self.call.bound = self.cost
+        self.call.given_up.clear()
+        return self.call.outcome(Status.SOLVED, self.plan)
 
 
 def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool) -> Outcome:

@@ -1,20 +1,22 @@
 """Tests for unsolvability, which run after failed searches, the cheapest test first.
 
 All tests examine only the lowest level. A failed search of an upper level proves nothing, because the level below may have other
-steps. A successful test stops planning. `confab.planner.solve` requires a certificate for each proof, and checks the certificate.
+steps. The last test examines all states of the lowest level; it may find a cheapest plan instead. A successful test stops planning.
+`confab.planner.solve` requires a certificate for each proof, and checks the certificate.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from time import perf_counter
 from typing import TYPE_CHECKING
 
 from confab.planner.hierarchical.call import Call
 from confab.planner.hierarchical.scope import LEAST
 from confab.planner.hierarchical.search_budget import WIDER
-from confab.planner.plan import OUT_OF_MEMORY, Reason, UngroundableError, UnsolvableError
+from confab.planner.plan import OUT_OF_MEMORY, Plan, Reason, UngroundableError, UnsolvableError
 from confab.reasoner.limits import within
 from confab.reasoner.symbols import Fact, Problem, State
 
@@ -24,6 +26,8 @@ if TYPE_CHECKING:
 
 LOOKING = 1_800_000
 """Work that is always allowed for the examination of all states; the unit is one relaxed operator in one state."""
+EASIER = 5
+"""Factor by which the examination of a state is faster than its evaluation during planning, whose work is counted."""
 FIRST_TESTS, AT_ONCE, PAIRS = 8_000, 20_000, 500_000
 """Maximum number of conditions that the search for a certificate tests.
 
@@ -40,18 +44,26 @@ MOST_ROWS, MOST_CHANGES = 2_000_000, 10_000_000
 (about 600 MB)."""
 
 
+def ignored(plan: Plan) -> bool:
+    """Ignore a plan."""
+    return False
+
+
 @dataclass
 class Proofs:
     """Attempts to prove that a call's problem has no plan; the attempts so far cost about as much as the searches so far.
 
-    If a proof isn't `wanted`, no attempt is made.
+    If a proof isn't `wanted`, no attempt is made. `found` is called with the first plan that the examination of states finds; this
+    is a cheapest plan of the lowest level. `found` returns whether the plan is a plan of the call's problem; then `solved` is true.
     """
 
     call: Call
     wanted: bool = True
+    found: Callable[[Plan], bool] = ignored
+    solved: bool = field(default=False, init=False)
     _lowest: Task | Reason | None = None
     _tests: int = 1
-    _states: int = 0
+    _states: float = 0
 
     @property
     def too_large(self) -> Reason | None:
@@ -87,7 +99,8 @@ class Proofs:
     def examine(self) -> None:
         """Raise `UnsolvableError` if delete relaxation or exhaustive search of the lowest level proves that there is no plan.
 
-        The exhaustive search is repeated each time that the work of the searches suffices for twice as many states.
+        The exhaustive search is repeated each time that the work of the searches suffices for twice as many states, until it finds
+        a plan.
         """
         space, program = self.call.space, self.call.program
         if not self._may_succeed():
@@ -96,11 +109,14 @@ class Proofs:
             self._lowest = proved(self.call.problem, program.levels[-1], space.deadline)
         if isinstance(self._lowest, Reason):
             return
-        states = max(LOOKING, space.worked) // max(len(self._lowest.owners), LEAST)
+        states = max(LOOKING, EASIER * space.worked) // max(len(self._lowest.owners), LEAST)
         if states >= 2 * self._states:
             self._states = states
-            if reason := exhausted(self._lowest, states, space.deadline):
-                raise UnsolvableError(reason)
+            if isinstance(result := exhausted(self._lowest, states, space.deadline), Reason):
+                raise UnsolvableError(result)
+            if result is not None:
+                self._states, self.solved = math.inf, True  # also if `found` raises an exception
+                self.solved = self.found(result)
 
     def _may_succeed(self) -> bool:
         """Return whether a proof is wanted, and no advice promises a plan after little work."""
@@ -171,7 +187,7 @@ def proved(problem: Problem, level: int, deadline: float | None = None) -> Task 
         too_large = refusal(reached)
         if too_large is not None:
             return too_large
-        task = ground(problem, level, deadline=deadline)
+        task = ground(problem, level, goal=problem.goal_on(level), deadline=deadline)
     except UngroundableError as error:
         return Reason(f"level {level} can't be grounded: {error}")
     except MemoryError:
@@ -181,12 +197,17 @@ def proved(problem: Problem, level: int, deadline: float | None = None) -> Task 
     return task
 
 
-def exhausted(task: Task, most: int, deadline: float | None = None) -> Reason | None:
-    """Return the reason why no reachable state satisfies the goal, or None if `most` states don't suffice for a proof."""
+def exhausted(task: Task, most: int, deadline: float | None = None) -> Reason | Plan | None:
+    """Search the states of a task in the order of their costs, at most `most` states.
+
+    Return a cheapest plan, the reason why no reachable state satisfies the goal, or None if the states don't suffice.
+    """
     from confab.planner.grounded.shortest import shortest
 
     found = shortest(task, most=most, deadline=deadline, known=most)
-    if found.plan is not None or found.bound < math.inf:
+    if found.plan is not None:
+        return Plan(task.steps(found.plan))
+    if found.bound < math.inf:
         return None
     count = len(found.states)
     return Reason(

@@ -17,7 +17,7 @@ from confab.planner.hierarchical.unsolvability import Proofs, exhausted
 from confab.planner.levels import levels_left
 from confab.planner.paper.hierarchy import DOUBT
 from confab.planner.paper.hierarchy import plan as paper
-from confab.planner.plan import Outcome, Plan, Status, UnsolvableError
+from confab.planner.plan import Outcome, Plan, Reason, Status, UnsolvableError
 from confab.planner.solve import Request, _proof, solve
 from confab.planner.validation import successor, validate
 from confab.reasoner.pddl.importing import imported
@@ -270,8 +270,8 @@ def test_the_reason_of_an_exhausted_search_states_the_number_of_states() -> None
         replace(pen({"IN lion": "yard"}), goal={Symbol("IN", ("lion",)): "yard", Symbol("AJAR", ("gate",)): TRUE}), 2
     )
     assert isinstance(task, Task)
-    assert exhausted(task, 100) is None
+    assert isinstance(exhausted(task, 100), Plan)
     shut = replace(task, barred={(task.initial, operator) for operator in range(len(task))})
     reason = exhausted(shut, 100)
-    assert reason is not None
+    assert isinstance(reason, Reason)
     assert reason.text == "none of all 1 states of level 2 that can be reached fulfils the goal"

@@ -417,7 +417,7 @@ def test_states_are_examined_only_within_bounds_and_not_repeatedly(monkeypatch: 
     assert isinstance(task, Task)
     impossible_goal = replace(task, goal=task.goal | 1 << task.facts.index(Fact(Symbol("AT", ("cup1",)), "table")))
     found = exhausted(impossible_goal, 10_000)
-    assert found is not None
+    assert isinstance(found, Reason)
     assert found.text == "none of all 54 states of level 1 that can be reached fulfils the goal"
     assert exhausted(impossible_goal, 53) is None
     assert exhausted(impossible_goal, 54) == found
