@@ -30,7 +30,7 @@ from confab.planner.hierarchical.call import Call, Compiled, as_refined, compile
 from confab.planner.hierarchical.operators import quantified
 from confab.planner.hierarchical.scope import BITS, MAKING
 from confab.planner.hierarchical.shortening import ORDERS, shortened
-from confab.planner.hierarchical.unsolvability import FINALLY
+from confab.planner.hierarchical.unsolvability import FINALLY, LOOKING
 from confab.planner.hierarchical.windows import regroupings
 from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, UnsolvableError, paused_collection
 from confab.planner.plan_costs import cost_of
@@ -201,13 +201,12 @@ class LowestLevelPlan:
     def __init__(self, call: Call) -> None:
         self.call = call
         self.plan: Plan | None = None
-        self.cost = 0.0
 
     def keep(self, plan: Plan) -> bool:
         """Keep a plan, grouped under steps of the levels above; return whether it is a plan of the call's problem.
 
         Planning goal by goal ends at once if all steps have been grouped under steps of the first level; otherwise it goes on with
-        as much work as it has done.
+        as much work as it has done, and at least with the work `LOOKING`.
 
         Raises
         ------
@@ -219,8 +218,8 @@ class LowestLevelPlan:
         self.plan = next((one for one in plans if not validate(call.problem, one)), None)
         if self.plan is None:
             return False
-        self.cost = cost_of(call.problem, self.plan)
-        space.most_work = min(space.most_work, 2 * space.worked)
+        call.bound = cost_of(call.problem, self.plan)
+        space.most_work = min(space.most_work, space.worked + max(space.worked, LOOKING))
         if all(step.level == call.program.levels[0] for step in self.plan.steps):
             space.most_work = 0
             raise LimitError("a cheapest plan was found")
@@ -230,7 +229,6 @@ class LowestLevelPlan:
         """Return the outcome of the call with the plan, or None without a plan."""
         if self.plan is None:
             return None
-        self.call.bound = self.cost
         self.call.given_up.clear()
         return self.call.outcome(Status.SOLVED, self.plan)
 

@@ -12,7 +12,16 @@ from confab.planner.grounded.grounding import ground
 from confab.planner.grounded.task import Task
 from confab.planner.hierarchical.planner import Call, compiled
 from confab.planner.hierarchical.scope import LEAST
-from confab.planner.hierarchical.unsolvability import LOOKING, Proofs, closed, exhausted, impossible, proved, refusal
+from confab.planner.hierarchical.unsolvability import (
+    EASIER,
+    LOOKING,
+    Proofs,
+    closed,
+    exhausted,
+    impossible,
+    proved,
+    refusal,
+)
 from confab.planner.plan import OUT_OF_MEMORY, Reason
 from confab.reasoner.amounts import Quantity
 from confab.reasoner.symbols import (
@@ -427,7 +436,7 @@ def test_states_are_examined_only_within_bounds_and_not_repeatedly(monkeypatch: 
     )
     proofs = Proofs(Call(problem, compiled(problem), None, 1))
     for work in (0, LOOKING, LOOKING * 3 // 2, 2 * LOOKING, 3 * LOOKING):
-        proofs.call.space.worked = work
+        proofs.call.space.worked = work // EASIER
         proofs.examine()
     most = LOOKING // max(len(task.owners), LEAST)
     assert examined == [most, 2 * most]
