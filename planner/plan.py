@@ -453,8 +453,7 @@ class UngroundableError(Exception):
 def paused_collection() -> Iterator[None]:
     """Pause the garbage collector of Python while the context is active.
 
-    Reading and planning create no reference cycles, and garbage collection would take a third of their time. Therefore the new
-    objects also count as old afterwards; otherwise the next collection would examine all of them.
+    Reading and planning create no reference cycles, and garbage collection would take a third of their time.
     """
     enabled = gc.isenabled()
     gc.disable()
@@ -462,8 +461,6 @@ def paused_collection() -> Iterator[None]:
         yield
     finally:
         if enabled:
-            gc.freeze()
-            gc.unfreeze()  # into the oldest generation
             gc.enable()
 
 

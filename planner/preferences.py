@@ -146,9 +146,9 @@ class _SoftGoalChoices:
                 found = self.extended(kept, begun) or found
             self.outcomes[kept] = found
             if found.plan is not None:
-                with overtime():
-                    met = Goals(self.weights.keys() - unmet_goals(self.problem, found.plan))
-                self.outcomes.setdefault(met, found)  # no search for goals that the plan meets without additional cost
+                self.outcomes.setdefault(
+                    self.met(found), found
+                )  # no search for goals that the plan meets without additional cost
             if found.certificate is not None and found.certificate.unmet:
                 unmet = frozenset((fact.symbol, fact.value) for fact in found.certificate.unmet)
                 self.conflicts.append((unmet, found))
@@ -295,28 +295,36 @@ class _SoftGoalChoices:
         longer: Outcome | None = outcome
         while longer is not None:
             outcome, longer, more = longer, None, dict[Symbol, Fraction | None]()
-            assert outcome.plan is not None
-            with overtime():
-                kept = Goals(self.weights.keys() - unmet_goals(self.problem, outcome.plan))
+            kept = self.met(outcome)
             for symbol in reversed(self.by_weight()):
                 if symbol not in kept:
                     other = self.extended(kept | {symbol}, outcome)
-                    more[symbol] = None if other is None else self.price(other) - self.price(outcome)
+                    more[symbol] = None if other is None else self.price(other)
                     if other is not None and self.price(other) - self.price(outcome) < self.weights[symbol]:
                         longer = other
                         break
         if shorten is not None:
             outcome = shorten(self.task(kept), outcome, False)
+            kept = self.met(outcome)
         cost, forgone = self.price(outcome), []
-        for symbol, extra in more.items():
+        for symbol, longer_cost in more.items():
+            if symbol in kept:
+                continue
             fact = Fact(symbol, self.problem.goal[symbol])
             wanted = conditions_of_goal(self.problem.domain, symbol)
             searched = self.more(chosen, symbol) if kept == chosen else None  # an extended plan has other unmet goals
-            known = [one for one in (extra, searched) if one is not None]
+            extended = None if longer_cost is None else longer_cost - cost
+            known = [one for one in (extended, searched) if one is not None]
             price = min(known).limit_denominator(PRECISION) if known else None
             forgone.append(Forgone(fact, self.weights[symbol], price, wanted, self.why(chosen | {symbol})))
         bound = None if least is None else float(min(least - self.unmet(kept), cost))
         return self.task(kept), replace(outcome, forgone=tuple(forgone), bound=bound)
+
+    def met(self, found: Outcome) -> Goals:
+        """Return the soft goals that the plan of an outcome meets."""
+        assert found.plan is not None
+        with overtime():
+            return Goals(self.weights.keys() - unmet_goals(self.problem, found.plan))
 
     def why(self, other: Goals) -> str:
         """Return why a choice has no plan: there is none, a limit ended the search, or the search found none."""

@@ -127,22 +127,25 @@ def by_events(problem: Problem) -> Problem | None:
             effect.when or (isinstance(effect, AmountEffect) and situations_in(effect.amount))
             for effect in timing.made(Span.THROUGHOUT)
         )
-        if not judged_by_events(problem) or by_begin or {v.name for v in one.variables}.intersection(timing.actors):
+        if by_begin or {v.name for v in one.variables}.intersection(timing.actors):
             return None
-        held = bool(timing.asked(Span.THROUGHOUT))
-        marks = [f"{name}@{mark}" for mark in ("running", *(["held"] if held else []))]
+        held, first = bool(timing.asked(Span.THROUGHOUT)), timing.made(Span.THROUGHOUT)
+        apart = bool(first and (timing.asked(Span.END) or timing.made(Span.END)))
+        marks = [f"{name}@{mark}" for mark in ("running", *["held"] * held, *["made"] * apart)]
         for mark in marks:
             kinds = tuple(p.kind for p in one.parameters)
             situations[mark] = SituationType(mark, kinds, "Truth", one.level, FALSE, FALSE, boolean=True)
         parts = [("begin", timing.asked(Span.START), timing.made(Span.START), marks[:1], FALSE)]
         if held:
-            parts.append(("during", timing.asked(Span.THROUGHOUT), (), marks[1:], FALSE))
-        ending = (*timing.made(Span.THROUGHOUT), *timing.made(Span.END))
+            parts.append(("during", timing.asked(Span.THROUGHOUT), (), marks[1:2], FALSE))
+        if apart:
+            parts.append(("made", (), first, marks[-1:], FALSE))
+        ending = timing.made(Span.END) if apart else (*first, *timing.made(Span.END))
         parts.append(("end", timing.asked(Span.END), ending, marks, TRUE))
         for part, asked, made, changed, was in parts:
             wanted = [c for c in asked if c not in (one.priced, one.lasting)]
             wanted += [ValueCondition(mark, its, was) for mark in changed]
-            wanted += [ValueCondition(marks[0], its, TRUE)] if part == "during" else []
+            wanted += [ValueCondition(marks[0], its, TRUE)] if part in ("during", "made") else []
             becomes = FALSE if was == TRUE else TRUE
             behaviors[f"{name}@{part}"] = replace(
                 one,

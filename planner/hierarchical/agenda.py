@@ -278,7 +278,7 @@ class Agenda:
         """Achieve all goals together; when this has doubled the effort of the call, first search the lowest level briefly."""
         call, space = self.call, self.call.space
         most = space.most_work
-        if self.below is None:
+        if self.below is None or self.proofs.solved:
             return self.all_goals(level)
         space.most_work = min(most, space.worked + space.effort)
         try:
@@ -287,7 +287,7 @@ class Agenda:
             if self.proofs.solved or not space.most_work < space.worked <= most:
                 raise
         finally:
-            if not self.proofs.solved:
+            if not self.proofs.solved:  # otherwise, a plan has been found meanwhile, and limits the work
                 space.most_work = most
         call.replace_steps(())
         del self._tried[level]

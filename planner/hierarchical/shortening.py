@@ -215,7 +215,7 @@ def neighbours(order: list[Cell], random: Random) -> Iterator[list[Cell]]:
 
 
 def drop_idle_end(call: Call) -> None:
-    """Drop the primitives after the first state in which all goals hold and all symbols are at rest, if the other steps remain.
+    """Drop the primitives after the first state in which all goals hold and all changed symbols are at rest, if the steps remain.
 
     The search may leave such primitives if the steps of a goal also achieve a later goal. A step without its last primitives
     remains if it still has its effect.
@@ -223,7 +223,10 @@ def drop_idle_end(call: Call) -> None:
     table, level = call.table, call.program.levels[-1]
 
     def ended() -> bool:
-        return all(map(call.met, call.goal)) and not any(map(call.restless, call.program.levels))
+        changed = {(situation, key) for situation, key, _ in table.trail}
+        return all(map(call.met, call.goal)) and all(
+            changed.isdisjoint(call.restless(each)) for each in call.program.levels
+        )
 
     table.undo(0)
     all_parts, many = [part for step in call.steps for part in parts(step, level)], 0

@@ -200,14 +200,14 @@ def proved(problem: Problem, level: int, deadline: float | None = None) -> Task 
 def exhausted(task: Task, most: int, deadline: float | None = None) -> Reason | Plan | None:
     """Search the states of a task in the order of their costs, at most `most` states.
 
-    Return a cheapest plan, the reason why no reachable state satisfies the goal, or None if the states don't suffice.
+    Return a cheapest plan, the reason why no reachable state satisfies the goal, or None if the states don't suffice to know.
     """
     from confab.planner.grounded.shortest import shortest
 
     found = shortest(task, most=most, deadline=deadline, known=most)
-    if found.plan is not None:
+    if found.plan is not None and found.bound >= task.cost_of(found.plan):
         return Plan(task.steps(found.plan))
-    if found.bound < math.inf:
+    if found.bound < math.inf or found.plan is not None:
         return None
     count = len(found.states)
     return Reason(

@@ -102,6 +102,7 @@ def test_without_a_time_limit_an_engine_runs_after_bounded_work_and_own_search_c
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("confab.plan_call.OURS_WORK", 0)
+    monkeypatch.setattr("confab.planner.hierarchical.unsolvability.LOOKING", 0)
     monkeypatch.setattr("confab.plan_call.find_spec", lambda name: name)
     monkeypatch.setattr(engines, "some_installed", lambda problem: True)
     scene = confab.load("towers-small")

@@ -1,6 +1,5 @@
 """Every command with `--time-limit`, and every call inside `confab.within`, ends at its time limit."""
 
-import gc
 import json
 import math
 from collections.abc import Callable
@@ -20,7 +19,7 @@ from confab.execution import Execution
 from confab.planner.hierarchical import planner as hierarchical
 from confab.planner.hierarchical.call import Call
 from confab.planner.hierarchical.shortening import shortened
-from confab.planner.plan import Plan, Status, paused_collection
+from confab.planner.plan import Plan, Status
 from confab.planning import Result
 from confab.reasoner.generate import write_scene
 from confab.reasoner.graph import query_process
@@ -124,12 +123,6 @@ def test_a_lesson_beyond_its_time_limit_adds_nothing_to_the_memory(solved: Resul
 def test_a_remark_on_superfluous_steps_ends_by_its_time_limit(solved: Result) -> None:
     with confab.within(0.0), pytest.raises(OutOfTimeError):
         solved.dearer()
-
-
-def test_the_garbage_collector_does_not_examine_the_objects_of_planning_at_once() -> None:
-    with paused_collection():
-        kept: list[list[int]] = [[number] for number in range(100_000)]
-    assert len(kept) > 10 * len(gc.get_objects(0))
 
 
 def test_a_simulation_ends_by_its_time_limit() -> None:

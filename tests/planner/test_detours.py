@@ -8,7 +8,7 @@ from confab.planner.hierarchical.planner import plan
 from confab.planner.hierarchical.shortening import shortened
 from confab.planner.levels import levels_left
 from confab.planner.validation import validate
-from confab.reasoner.symbols import Problem, SituationType
+from confab.reasoner.symbols import FALSE, TRUE, Problem, SituationType
 from worlds.writing import becomes, behavior, has, lacks, world
 
 
@@ -72,14 +72,18 @@ def test_pairs_of_steps_that_cancel_each_other_are_removed_from_the_inside_out(i
 @pytest.mark.parametrize("inside", [True, False])
 def test_primitives_after_the_first_state_with_all_goals_are_dropped_even_without_time(inside: bool) -> None:
     problem = world(
-        [SituationType("AT", ("Item",), "Place"), SituationType("VAN", ("Van",), "Place", level=2)],
+        [
+            SituationType("AT", ("Item",), "Place"),
+            SituationType("VAN", ("Van",), "Place", level=2),
+            SituationType("LAMP", ("Van",), "Truth", level=2, rest=FALSE, boolean=True),  # on, and nothing changes it
+        ],
         [
             behavior("BRING", 1, "?i:Item ?p:Place", [lacks("AT", "?i", "?p")], [becomes("AT", "?i", "?p")]),
             behavior("CARRY", 2, "?i:Item ?p:Place", [has("VAN", "van", "?p")], [becomes("AT", "?i", "?p")]),
             behavior("DRIVE", 2, "?p:Place", [lacks("VAN", "van", "?p")], [becomes("VAN", "van", "?p")]),
         ],
         {"Item": ("item",), "Van": ("van",), "Place": ("north", "south", "west")},
-        {"AT item": "north", "VAN van": "north"},
+        {"AT item": "north", "VAN van": "north", "LAMP van": TRUE},
         {"AT item": "south"},
     )  # fmt: skip
     call = Call(problem, compiled(problem), None, 1000)

@@ -9,15 +9,26 @@ import pytest
 import confab
 from confab.planner.certificate_checks import refusal
 from confab.planner.certifying import certify
-from confab.planner.plan import Limits, Outcome, Status
+from confab.planner.plan import Limits, Outcome, Plan, Status, Step
 from confab.planner.solve import Request, solve
-from confab.planner.timed.plan import TimedPlan, schedule_of
+from confab.planner.timed.plan import Slot, TimedPlan, schedule_of
 from confab.planner.timed.validation import validate_in_sequence, validate_timed
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse
 from confab.reasoner.pddl.turtle import turtle
-from confab.reasoner.symbols import Problem
+from confab.reasoner.symbols import (
+    TRUE,
+    Condition,
+    Effect,
+    Problem,
+    SituationType,
+    Span,
+    Timing,
+    ValueEffect,
+)
+from confab.reasoner.timing import projected
 from worlds.timed import Action, TimedWorld, least_makespan, problem_of
+from worlds.writing import becomes, behavior, has, world
 
 SPANS = {"s": "at start", "o": "over all", "e": "at end"}
 Literals = str
@@ -192,3 +203,37 @@ def test_unsolvable_random_worlds_have_no_plan_with_overlaps_either() -> None:
         timed = schedule_of(outcome)
         assert (timed and timed.makespan) == least
         assert (outcome.status is Status.UNSOLVABLE) == (least is None)
+
+
+def test_no_proof_overlooks_that_a_step_gives_what_it_needs_at_its_end() -> None:
+    asked = ((Span.END, has("P", "?t", TRUE)),)
+    made = ((Span.THROUGHOUT, becomes("P", "?t", TRUE)), (Span.END, becomes("G", "?t", TRUE)))
+    problem = spanned(1, asked, made, "G")
+    alone = Plan((Step((0,), problem.id_of("W", ("t",)), 1, "W", ("t",)),))
+    assert validate_timed(problem, TimedPlan(alone, (Slot(alone.primitives[0], Fraction(0), Fraction(2)),))) == []
+    assert solve(Request(problem, limits=Limits(seconds=10.0))).status is not Status.UNSOLVABLE
+
+
+def test_a_task_of_several_levels_whose_steps_have_spans_is_proved_unsolvable() -> None:
+    problem = spanned(2, ((Span.START, has("G", "?t", TRUE)),), ((Span.END, becomes("P", "?t", TRUE)),), "P")
+    outcome = solve(Request(problem, limits=Limits(seconds=10.0)))
+    assert outcome.status is Status.UNSOLVABLE
+    assert outcome.certificate is not None
+    assert refusal(problem, outcome.certificate) is None
+
+
+def spanned(
+    level: int, asked: tuple[tuple[Span, Condition], ...], made: tuple[tuple[Span, Effect], ...], goal: str
+) -> Problem:
+    """Return a task with one behaviour W on a level, whose conditions and effects have spans."""
+    preconditions, effects = projected(asked, made)
+    values = [effect for effect in effects if isinstance(effect, ValueEffect)]
+    one = behavior("W", level, "?t:T", preconditions, values)
+    above = [behavior("ABOVE", 1, "?t:T", [], [becomes(goal, "?t", TRUE)])] if level > 1 else []
+    return world(
+        [SituationType(name, ("T",), "Truth", boolean=True) for name in "PG"],
+        [*above, replace(one, timing=Timing(Fraction(2), (), asked, made))],
+        {"T": ("t",)},
+        {},
+        {f"{goal} t": TRUE},
+    )

@@ -17,20 +17,21 @@ import ontology
 from confab.cli import app
 from confab.interchange import outcome_json
 from confab.plan_call import CHOICE_WORK
-from confab.planner.plan import Limits, Outcome, Plan, Reason, Status
+from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, Step
 from confab.planner.plan_costs import cost_of
 from confab.planner.preferences import preferred
 from confab.planner.solve import Request, solve
-from confab.planner.validation import validate
+from confab.planner.validation import unmet_goals, validate
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import OutOfTimeError
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse
 from confab.reasoner.pddl.words import PddlError
-from confab.reasoner.symbols import Problem, Symbol
+from confab.reasoner.symbols import TRUE, Problem, SituationType, Symbol
 from worlds.interpreter import Interpreter
 from worlds.mixed import mixed
 from worlds.scenes import scene
+from worlds.writing import becomes, behavior, world
 
 SCENE = (ontology.ROOT / "scenes" / "wishes-small.ttl").read_text("utf-8")
 
@@ -472,3 +473,37 @@ def test_a_plan_is_extended_by_steps_for_a_soft_goal_that_the_choices_left_unmet
     assert (chosen.goal, outcome.forgone) == (problem.goal, ())
     assert outcome.plan is not None
     assert not validate(chosen, outcome.plan)
+
+
+@pytest.mark.parametrize(("final", "left"), [("FAST", 0), ("QUICK", 1)])
+def test_a_goal_that_only_the_shortened_plan_meets_is_not_listed_as_unmet(final: str, left: int) -> None:
+    costs = {"SLOW": 50.0, "FAST": 5.0, "SOFT": 20.0, "QUICK": 4.0}
+    effects = {"SLOW": "G", "FAST": "G S", "SOFT": "S", "QUICK": "G"}
+    problem = world(
+        [SituationType(name, ("T",), "Truth", boolean=True) for name in "GS"],
+        [
+            replace(behavior(name, 1, "?t:T", [], [becomes(s, "?t", TRUE) for s in effects[name].split()]), cost=cost)
+            for name, cost in costs.items()
+        ],
+        {"T": ("t",)},
+        {},
+        {"G t": TRUE, "S t": TRUE},
+    )
+    problem = replace(problem, weights={Symbol("S", ("t",)): Fraction(10)})
+
+    def planned(*names: str) -> Outcome:
+        steps = (Step((i,), problem.id_of(name, ("t",)), 1, name, ("t",)) for i, name in enumerate(names))
+        return Outcome(Status.SOLVED, Plan(tuple(steps)))
+
+    def search(choice: Problem) -> Outcome:
+        return planned("SLOW", "SOFT") if Symbol("S", ("t",)) in choice.goal else planned("SLOW")
+
+    def extended(_: Problem, found: Outcome) -> Outcome:
+        assert found.plan is not None
+        return planned(*(step.behavior for step in found.plan.primitives), "SOFT")
+
+    _, outcome = preferred(
+        problem, search, shorten=lambda _, found, briefly: found if briefly else planned(final), extend=extended
+    )
+    assert outcome.plan is not None
+    assert [len(unmet_goals(problem, outcome.plan)), len(outcome.forgone)] == [left, left]

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from itertools import pairwise
 
 import pytest
 
@@ -22,7 +23,7 @@ from confab.planner.hierarchical.unsolvability import (
     proved,
     refusal,
 )
-from confab.planner.plan import OUT_OF_MEMORY, Reason
+from confab.planner.plan import OUT_OF_MEMORY, Plan, Reason
 from confab.reasoner.amounts import Quantity
 from confab.reasoner.symbols import (
     FALSE,
@@ -440,6 +441,28 @@ def test_states_are_examined_only_within_bounds_and_not_repeatedly(monkeypatch: 
         proofs.examine()
     most = LOOKING // max(len(task.owners), LEAST)
     assert examined == [most, 2 * most]
+
+
+def test_a_plan_that_the_examination_of_states_returns_is_a_cheapest_plan() -> None:
+    chain = tuple(f"c{i}" for i in range(8))
+    dear = replace(behavior("DEAR", 1, "?t:Tool", [], [becomes("DONE", "?t", TRUE)]), cost=50.0)
+    cheap = behavior("CHEAP", 1, "?t:Tool", [has("CHAIN", "?t", chain[-1])], [becomes("DONE", "?t", TRUE)])
+    links = [
+        behavior(f"LINK{i}", 1, "?t:Tool", [has("CHAIN", "?t", one)], [becomes("CHAIN", "?t", other)])
+        for i, (one, other) in enumerate(pairwise(chain))
+    ]
+    problem = world(
+        [SituationType("DONE", ("Tool",), "Truth", boolean=True), SituationType("CHAIN", ("Tool",), "CHAIN")],
+        [dear, cheap, *links],
+        {"Tool": ("tool",), "CHAIN": chain},
+        {"CHAIN tool": "c0"},
+        {"DONE tool": TRUE},
+    )
+    task = ground(problem, 1)
+    assert isinstance(task, Task)
+    results = [exhausted(task, most) for most in range(1, 30)]
+    assert {len(result.steps) for result in results if isinstance(result, Plan)} == {8}
+    assert results[3] is None  # the expensive plan is known, and nothing proves that no plan is cheaper
 
 
 # ------------------------------------------------------------------------------------------------------ random worlds
