@@ -79,6 +79,8 @@ def parse_intervention(problem: Problem, text: str) -> Intervention:
         ) from error
     verb, _, rest = match[3].partition(" ")
     words = rest.split()
+    if verb in problem.individuals and words[:1] and words[0] in problem.domain.situations:
+        verb = ""  # an individual with the name of a verb, in a fact
     if verb == "goal":
         if not words:
             raise KnowledgeError(f"'{text}': wanted 'goal object SITUATION value'")

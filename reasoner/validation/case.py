@@ -75,6 +75,10 @@ class ReadCase(Case):
 
     @property
     def behaviors_and_rules(self) -> list[tuple[str, Behavior]]:
-        """The behaviours, and the rules in the form of behaviours, by name; several rules may have one name."""
+        """The behaviours, and the rules in the form of behaviours, by name; several rules may have one name.
+
+        A goal about a class has a rule for each member; the first one, which has the goal's name, stands for all of them.
+        """
         domain = self.problem.domain
-        return [*domain.behaviors.items(), *((name, one.behavior) for name, its in domain.rules.items() for one in its)]
+        rules = ((name, one.behavior) for name, its in domain.rules.items() if name in self.names for one in its)
+        return [*domain.behaviors.items(), *rules]

@@ -107,8 +107,8 @@ def defined(case: ReadCase) -> Iterator[Fault]:
     changed = frozenset[str]().union(*(behavior.changes for behavior in domain.behaviors.values()))
     reads = {name: {s for rule in its for s, _ in needed(rule.conditions)} for name, its in domain.rules.items()}
     for name in domain.rules:
-        if name in names and names.iri(name) not in case.reading.schema.nodes:
-            continue  # a situation type that expresses a constraint on several states
+        if name not in names or names.iri(name) not in case.reading.schema.nodes:
+            continue  # it expresses a constraint on several states, or a goal about a further member of a class
         if closure([name], lambda each: reads.get(each, ())) & changed:
             what = f"{name} is derived: in every state it follows from {' and '.join(sorted(reads[name] - {name}))}"
             why = "planning derives it in each state from its definition; no behaviour changes it"

@@ -23,6 +23,7 @@ from confab.reasoner.memory.episodes import assert_episode
 from confab.reasoner.symbols import Symbol
 from confab.reasoner.validation.validate import validate
 from confab.reasoner.vocabulary import EPISODES, PROV
+from tests.ontology.faults import skeleton
 
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 FIGURE_8 = ("after=28 cup2 LOCATION location8", "after=28 goal cup2 LOCATION location8")
@@ -131,6 +132,14 @@ def test_a_goal_about_an_added_individual_is_reached_by_an_effect_on_all_members
     assert run.episode.status is End.REACHED
     assert run.episode.observed[Symbol("AT", ("parcel",))] == "store"
     assert "parcel" not in {one for step in run.episode.done.steps if step.behavior == "PUSH" for one in step.arguments}
+
+
+def test_an_individual_may_have_the_name_of_a_form_of_intervention(tmp_path: Path) -> None:
+    scene = skeleton(tmp_path)
+    scene.write_text(scene.read_text(encoding="utf-8").replace(":plate2", ":box"), encoding="utf-8")
+    (moved,) = parse_interventions(confab.load(scene).problem, ["after=1 box PLACE sink"])
+    assert moved.change is InterventionKind.WORLD
+    assert [str(fact) for fact in moved.facts] == ["box PLACE sink"]
 
 
 def test_every_form_of_intervention_is_read() -> None:

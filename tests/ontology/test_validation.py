@@ -123,6 +123,17 @@ def test_a_domain_or_range_of_all_things_restricts_nothing(tmp_path: Path) -> No
     assert planned() == before
 
 
+def test_a_negated_goal_about_all_individuals_of_a_class_has_no_fault(tmp_path: Path) -> None:
+    scene = skeleton(tmp_path)
+    text = scene.read_text(encoding="utf-8")
+    away = "c:about d:Plate ; c:situationType d:PLACE ; c:value :table ; c:negated true"
+    text = text.replace("c:about :plate1 ; c:situationType d:PLACE ; c:value :table", away)
+    scene.write_text(text, encoding="utf-8")
+    assert away in text
+    assert [str(finding) for finding in validate([scene]) if finding.severity == "error"] == []
+    assert confab.load(scene).plan().solved
+
+
 @pytest.mark.parametrize(
     ("title", "node", "remedy"),
     [
