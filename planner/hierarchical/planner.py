@@ -205,13 +205,13 @@ class LowestLevelPlan:
     def keep(self, plan: Plan) -> bool:
         """Keep a plan, grouped under steps of the levels above; return whether it is a plan of the call's problem.
 
-        Planning goal by goal ends at once if all steps have been grouped under steps of the first level; otherwise it goes on with
-        as much work as it has done, and at least with the work `LOOKING`.
+        Planning goal by goal ends at once if all steps have been grouped under single steps of the first level; otherwise it goes
+        on with as much work as it has done, and at least with the work `LOOKING`.
 
         Raises
         ------
         LimitError
-            All steps have been grouped.
+            All steps have been grouped under single steps.
         """
         call, space = self.call, self.call.space
         plans = regroupings(call.problem, plan, call.program.levels[-1], call.using)
@@ -220,7 +220,7 @@ class LowestLevelPlan:
             return False
         call.bound = cost_of(call.problem, self.plan)
         space.most_work = min(space.most_work, space.worked + max(space.worked, LOOKING))
-        if all(step.level == call.program.levels[0] for step in self.plan.steps):
+        if all(step.level == call.program.levels[0] and not step.joined for step in self.plan.steps):
             space.most_work = 0
             raise LimitError("a cheapest plan was found")
         return True

@@ -316,7 +316,8 @@ def test_a_step_without_refinement_is_not_tried_again_after_a_lesson_or_an_episo
         led = plan(within, Advisor(experience))
         assert led.plan is not None and alone.plan is not None
         assert led.plan.length == alone.plan.length
-        assert (expanded(led), led.misses) == (10, 0) < (expanded(alone), alone.misses)
+        assert (expanded(led), led.misses) == (10, 0)
+        assert alone.misses > 0
         live(experience, [(within, led.plan)])
 
 
