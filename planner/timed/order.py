@@ -165,9 +165,9 @@ def _pools(problem: Problem, activities: Sequence[Activity], events: Sequence[St
         for access, which, other in ((one.begin, BEGIN, EventKind.END), (one.end, END, EventKind.BEGIN)):
             for cell, count in access.counts.items() if moment is not other else ():
                 found[cell].append((number, which, count))
-    unfit = {(symbol.situation, symbol.arguments) for symbol in (problem.times or Times()).deadlines}
-    for one in activities if found else ():
-        unfit.update(*((access.reads | access.changes.keys()) - access.counts.keys() for access in one.accesses))  # type: ignore[arg-type]
+    unfit: set[ReadAccess] = {(symbol.situation, symbol.arguments) for symbol in (problem.times or Times()).deadlines}
+    for access in (access for one in activities if found for access in one.accesses):
+        unfit |= (access.reads | access.changes.keys()) - access.counts.keys()
     pools = dict[Cell, Resource]()
     for cell, its in found.items():
         symbol, quantity = Symbol(*cell), problem.domain.situations[cell[0]].quantity

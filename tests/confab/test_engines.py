@@ -102,10 +102,9 @@ def test_without_a_time_limit_an_engine_runs_after_bounded_work_and_own_search_c
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("confab.plan_call.OURS_WORK", 0)
-    monkeypatch.setattr("confab.planner.hierarchical.unsolvability.LOOKING", 0)
     monkeypatch.setattr("confab.plan_call.find_spec", lambda name: name)
     monkeypatch.setattr(engines, "some_installed", lambda problem: True)
-    scene = confab.load("towers-small")
+    scene = confab.load("library-large")
     assert scene.plan().json()["engine"] == "any"
     assert scene.plan(engine="none").outcome.engine is None
     monkeypatch.setattr(engines, "answer", lambda *_: ("e", "TIMEOUT", []))
