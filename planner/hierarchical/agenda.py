@@ -32,7 +32,6 @@ from confab.planner.hierarchical.search_budget import (
 from confab.planner.hierarchical.unsolvability import Proofs, ignored
 from confab.planner.plan import Plan
 from confab.planner.transitions import Cell, arguments_of
-from confab.reasoner.limits import LimitError
 from confab.reasoner.symbols import Condition
 
 
@@ -51,20 +50,15 @@ class Agenda:
     trial : bool
         Whether applied steps are final, and a failure proves nothing. Otherwise, the agenda may restart from the initial state, and
         attempts to prove that there is no plan.
-    below : function, optional
-        Function that replaces all steps by the steps of a brief search of the lowest level as a whole; it returns whether all goals
-        hold.
     found : function of a plan, optional
-        Function that is called with a cheapest plan of the lowest level if an attempt to prove that there is no plan finds one; it
-        returns whether this is a plan of the call's problem.
+        Function that is called with a cheapest plan of the lowest level if an attempt to prove that there is no plan finds one.
     """
 
     call: Call
     levels: tuple[int, ...] | None = None
     quickly: bool = False
     trial: bool = False
-    below: Callable[[], bool] | None = None
-    found: Callable[[Plan], bool] = ignored
+    found: Callable[[Plan], None] = ignored
     _open: deque[Cell] = field(default_factory=deque)
     _asleep: dict[Cell, None] = field(default_factory=dict)
     _waiting: dict[Cell, list[Cell]] = field(default_factory=dict)
@@ -266,32 +260,13 @@ class Agenda:
         call.steps, call.given_up = [], []
         call.kept = {cell: value for cell, value in call.goal.items() if call.met(cell)}
         refiner.careful = True
-        if self.all_goals_or_below(level):
+        if self.all_goals(level):
             self.begin()
             return True
         refiner.careful = False
         call.replace_steps(steps)
         call.steps, call.given_up, call.kept = steps, given_up, kept
         return False
-
-    def all_goals_or_below(self, level: int) -> bool:
-        """Achieve all goals together; when this has doubled the effort of the call, first search the lowest level briefly."""
-        call, space = self.call, self.call.space
-        most = space.most_work
-        if self.below is None or self.proofs.solved:
-            return self.all_goals(level)
-        space.most_work = min(most, space.worked + space.effort)
-        try:
-            return self.all_goals(level)
-        except LimitError:
-            if self.proofs.solved or not space.most_work < space.worked <= most:
-                raise
-        finally:
-            if not self.proofs.solved:  # otherwise, a plan has been found meanwhile, and limits the work
-                space.most_work = most
-        call.replace_steps(())
-        del self._tried[level]
-        return self.below() or self.all_goals(level)
 
     def all_goals(self, level: int) -> bool:
         """Achieve all goals together on a level from the current state; return whether that succeeded.

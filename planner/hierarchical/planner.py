@@ -21,16 +21,15 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
 from time import perf_counter
 
 from confab.planner.applicable import MOST_LOOPS
 from confab.planner.hierarchical.agenda import Agenda
 from confab.planner.hierarchical.call import Call, Compiled, as_refined, compiled
 from confab.planner.hierarchical.operators import quantified
-from confab.planner.hierarchical.scope import BITS, MAKING
+from confab.planner.hierarchical.scope import BITS
 from confab.planner.hierarchical.shortening import ORDERS, shortened
-from confab.planner.hierarchical.unsolvability import FINALLY, LOOKING
+from confab.planner.hierarchical.unsolvability import FINALLY, LOOKING, ignored
 from confab.planner.hierarchical.windows import regroupings
 from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, UnsolvableError, paused_collection
 from confab.planner.plan_costs import cost_of
@@ -54,8 +53,6 @@ TRIALS = 400_000
 """Maximum number of trials if a level can't be grounded (about four seconds); a trial tests one behaviour in one state."""
 FIRST = 8
 """Divisor of `TRIALS` for a task of one level before planning goal by goal."""
-BRIEFLY = 16
-"""The lowest level is searched as a whole, during a restart, with the effort so far divided by this number."""
 NOT_LEFT = "levels must not be left"
 SEARCHING, SHORTENING = 0.93, 0.85
 """Shares of the time limit after which the search ends, and after which a plan isn't shortened any more.
@@ -135,9 +132,7 @@ def _plan(
     advised(call)
     levels = call.program.levels if leave_levels else call.program.levels[:1]
     cheapest = LowestLevelPlan(call)
-    agenda = Agenda(call, levels)
-    if leave_levels:
-        agenda = Agenda(call, levels, below=partial(below, call, limits), found=cheapest.keep)
+    agenda = Agenda(call, levels, found=cheapest.keep if leave_levels else ignored)
     try:
         resumed = first is not None and call.resume(first)
         more = resumed and call.kept.keys() != call.goal.keys()
@@ -181,20 +176,6 @@ def before_the_check(call: Call, until: float | None) -> float | None:
     return min(until, deadline.at - CHECKS * (perf_counter() - begin))
 
 
-def below(call: Call, limits: Limits) -> bool:
-    """Search the lowest level briefly; return whether steps of the first level, which these steps refine, achieve all goals."""
-    most = call.space.effort // BRIEFLY
-    flat = lowest_alone(call, limits, BITS * most, 5 * most // MAKING)
-    if flat.plan is None:
-        return False
-    plan = regroupings(call.problem, flat.plan, call.program.levels[-1], call.using)[0]
-    if any(step.level != call.program.levels[0] for step in plan.steps) or validate(call.problem, plan):
-        return False
-    call.steps = as_refined(call, plan.steps)
-    call.replace_steps(call.steps)
-    return all(map(call.met, call.goal))
-
-
 class LowestLevelPlan:
     """A cheapest plan of the lowest level, found by the examination of its states during planning goal by goal."""
 
@@ -202,8 +183,8 @@ class LowestLevelPlan:
         self.call = call
         self.plan: Plan | None = None
 
-    def keep(self, plan: Plan) -> bool:
-        """Keep a plan, grouped under steps of the levels above; return whether it is a plan of the call's problem.
+    def keep(self, plan: Plan) -> None:
+        """Keep a plan, grouped under steps of the levels above, if it is a plan of the call's problem.
 
         Planning goal by goal ends at once if all steps have been grouped under single steps of the first level; otherwise it goes
         on with as much work as it has done, and at least with the work `LOOKING`.
@@ -217,13 +198,12 @@ class LowestLevelPlan:
         plans = regroupings(call.problem, plan, call.program.levels[-1], call.using)
         self.plan = next((one for one in plans if not validate(call.problem, one)), None)
         if self.plan is None:
-            return False
+            return
         call.bound = cost_of(call.problem, self.plan)
         space.most_work = min(space.most_work, space.worked + max(space.worked, LOOKING))
         if all(step.level == call.program.levels[0] and not step.joined for step in self.plan.steps):
             space.most_work = 0
             raise LimitError("a cheapest plan was found")
-        return True
 
     def outcome(self) -> Outcome | None:
         """Return the outcome of the call with the plan, or None without a plan."""
@@ -246,7 +226,7 @@ def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool) -> Outcome:
             f"{'were' if len(upper) > 1 else 'was'} given up for the whole task"
         )
     if agenda.proofs.too_large is None:
-        flat = lowest_alone(call, limits, BITS * limits.work)
+        flat = lowest_alone(call, limits)
     elif without_grounding(call, TRIALS):
         flat = Outcome(Status.SOLVED, call.tree())
     else:
@@ -300,7 +280,7 @@ def flat_first(problem: Problem, limits: Limits, deadline: float | None) -> Outc
     return plan_level(problem, limits=limits.until(deadline), most_work=FLAT, most_rows=FLAT_ROWS)
 
 
-def lowest_alone(call: Call, limits: Limits, most_work: float, most_rows: int | None = None) -> Outcome:
+def lowest_alone(call: Call, limits: Limits) -> Outcome:
     """Search the lowest level from the initial state.
 
     If a changed symbol isn't at rest at the end of the plan, the plan is invalid. The search is then repeated with all rest values
@@ -314,7 +294,7 @@ def lowest_alone(call: Call, limits: Limits, most_work: float, most_rows: int | 
     rests = {Symbol(cell[0], arguments_of(cell[1])): value for cell, value in restless.items()}
     goal = problem.goal_on(lowest)
     for wanted in (goal, {**rests, **goal}):
-        flat = plan_level(problem, lowest, None, wanted, limits.until(deadline), most_work, most_rows)
+        flat = plan_level(problem, lowest, None, wanted, limits.until(deadline), BITS * limits.work)
         call.count(flat)
         if not rests or flat.plan is None or not validate(problem, flat.plan):
             break

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -44,9 +44,8 @@ MOST_ROWS, MOST_CHANGES = 2_000_000, 10_000_000
 (about 600 MB)."""
 
 
-def ignored(plan: Plan) -> bool:
+def ignored(plan: Plan) -> None:
     """Ignore a plan."""
-    return False
 
 
 @dataclass
@@ -54,13 +53,12 @@ class Proofs:
     """Attempts to prove that a call's problem has no plan; the attempts so far cost about as much as the searches so far.
 
     If a proof isn't `wanted`, no attempt is made. `found` is called with the first plan that the examination of states finds; this
-    is a cheapest plan of the lowest level. `found` returns whether the plan is a plan of the call's problem; then `solved` is true.
+    is a cheapest plan of the lowest level.
     """
 
     call: Call
     wanted: bool = True
-    found: Callable[[Plan], bool] = ignored
-    solved: bool = field(default=False, init=False)
+    found: Callable[[Plan], None] = ignored
     _lowest: Task | Reason | None = None
     _tests: int = 1
     _states: float = 0
@@ -115,8 +113,8 @@ class Proofs:
             if isinstance(result := exhausted(self._lowest, states, space.deadline), Reason):
                 raise UnsolvableError(result)
             if result is not None:
-                self._states, self.solved = math.inf, True  # also if `found` raises an exception
-                self.solved = self.found(result)
+                self._states = math.inf
+                self.found(result)
 
     def _may_succeed(self) -> bool:
         """Return whether a proof is wanted, and no advice promises a plan after little work."""
