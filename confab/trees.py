@@ -12,7 +12,19 @@ from pathlib import Path
 from typing import Any
 
 from confab.planner.acting.world import World
-from confab.planner.behavior_tree import All, Do, First, Holds, Mark, Marked, Situation, Subtree, Together, TreeNode
+from confab.planner.behavior_tree import (
+    All,
+    Assign,
+    Check,
+    Do,
+    First,
+    Holds,
+    Situation,
+    Subtree,
+    Together,
+    TreeNode,
+    mark,
+)
 from confab.planner.behavior_tree import behavior_tree as tree_of
 from confab.planner.plan import Plan, Step
 from confab.reasoner.files import check_replaceable, made_folder, write_whole
@@ -56,7 +68,7 @@ class Element:
 
     The kinds are Fallback, Sequence, Once, Parallel, SubTree, Check, Set, Again, Condition and Action. The nodes Fallback and
     Sequence begin with their first child in each tick. A Once node is a sequence that resumes at its running child. `name` is the
-    name of a subtree, a leaf or a mark; a mark is a flag which states that a step is finished. `key` identifies a leaf.
+    name of a subtree, a leaf or a variable; a variable has a number. `key` identifies a leaf.
     """
 
     kind: str
@@ -70,10 +82,13 @@ class Element:
 class Tree:
     """The behaviour tree of a plan.
 
-    `subtrees` has the subtrees by name, with the whole tree first. `leaves` has the condition or the primitive of each leaf, by
+    An attempt ticks the subtree `first` once, and then the subtree `then` until it succeeds or fails. `subtrees` has all subtrees
+    by name. `leaves` has the condition or the primitive of each leaf, by
     the leaf's key. `possible` has the names of the leaves that check the preconditions of a primitive.
     """
 
+    first: str
+    then: str
     subtrees: Mapping[str, Element]
     leaves: Mapping[str, Fact | Condition | Step]
     possible: frozenset[str]
@@ -89,8 +104,8 @@ class Tree:
 def behavior_tree(problem: Problem, plan: Plan) -> Tree:
     """Return the behaviour tree of a valid plan, with nodes that both BehaviorTree.CPP and py_trees support."""
     lowering = _ElementWriter(problem)
-    lowering.lowered(tree_of(problem, plan))
-    return Tree(lowering.subtrees, lowering.leaves, frozenset(lowering.possible))
+    first, then = (lowering.lowered(tree).name for tree in tree_of(problem, plan))
+    return Tree(first, then, lowering.subtrees, lowering.leaves, frozenset(lowering.possible))
 
 
 def export_trees(problem: Problem, plan: Plan, folder: Path) -> tuple[Path, Path]:
@@ -126,12 +141,11 @@ class _ElementWriter:
                 self.possible.add(f"{name}_possible")
                 possible = self.leaf("Condition", f"{name}_possible", ports, step)
                 once = Element("Once", children=(possible, self.leaf("Action", name, ports, step)))
-                return Element("Sequence", children=(once, Element("Again")))
-            case Marked(path):
-                return Element("Check", _mark(path))
-            case Mark(path, child):
-                yes, no = (Element("Set", _mark(path), ports={"value": value}) for value in ("true", "false"))
-                return Element("Fallback", children=(Element("Sequence", children=(self.lowered(child), yes)), no))
+                return Element("Sequence", children=(once, self.lowered(mark(step.path, 1)), Element("Again")))
+            case Check(variable, comparison, number):
+                return Element("Check", variable, ports={"comparison": comparison, "number": str(number)})
+            case Assign(variable, number):
+                return Element("Set", variable, ports={"number": str(number)})
             case All(nodes):
                 return Element("Sequence", children=tuple(map(self.lowered, nodes)))
             case First(nodes):
@@ -164,10 +178,6 @@ class _ElementWriter:
         return _identifier(one.symbol.situation), {**arguments, "value": one.value}
 
 
-def _mark(path: tuple[int, ...]) -> str:
-    return "done_" + "_".join(map(str, path))
-
-
 def _identifier(name: str) -> str:
     """Return an identifier of letters, digits and underscores that isn't a reserved name of BehaviorTree.CPP or py_trees."""
     found = re.sub(r"\W+", "_", name).strip("_")
@@ -180,15 +190,23 @@ def _identifier(name: str) -> str:
 TAGS = {"Fallback": "ReactiveFallback", "Sequence": "ReactiveSequence", "Once": "Sequence", "Parallel": "Parallel"}
 
 
+MAIN = "attempts"
+"""The name of the whole tree, which makes attempts."""
+
+
+def attempt(tree: Tree) -> Element:
+    """Return the node of one attempt."""
+    return Element("Once", children=(Element("SubTree", tree.first), Element("SubTree", tree.then)))
+
+
 def to_btcpp(tree: Tree) -> str:
     """Return a tree as XML for BehaviorTree.CPP 4, with models of its nodes."""
-    first = next(iter(tree.subtrees))
-    root = ElementTree.Element("root", {"BTCPP_format": "4", "main_tree_to_execute": first})
+    root = ElementTree.Element("root", {"BTCPP_format": "4", "main_tree_to_execute": MAIN})
+    main = ElementTree.SubElement(root, "BehaviorTree", {"ID": MAIN})
+    retry = ElementTree.SubElement(main, "RetryUntilSuccessful", {"num_attempts": str(RETRIES)})
+    retry.append(_xml(attempt(tree)))
     for name, element in tree.subtrees.items():
-        node = ElementTree.SubElement(root, "BehaviorTree", {"ID": name})
-        if name == first:
-            node = ElementTree.SubElement(node, "RetryUntilSuccessful", {"num_attempts": str(RETRIES)})
-        node.append(_xml(element))
+        ElementTree.SubElement(root, "BehaviorTree", {"ID": name}).append(_xml(element))
     model = ElementTree.SubElement(root, "TreeNodesModel")
     for (kind, name), ports in sorted(_models(tree).items()):
         node = ElementTree.SubElement(model, kind, {"ID": name})
@@ -203,9 +221,11 @@ def _xml(element: Element) -> ElementTree.Element:
         case "SubTree":
             return ElementTree.Element("SubTree", {"ID": element.name, "_autoremap": "true"})
         case "Check":
-            return ElementTree.Element("ScriptCondition", {"code": f"{element.name} == true"})
+            return ElementTree.Element(
+                "ScriptCondition", {"code": f"{element.name} {element.ports['comparison']} {element.ports['number']}"}
+            )
         case "Set":
-            return ElementTree.Element("Script", {"code": f"{element.name} := {element.ports['value']}"})
+            return ElementTree.Element("Script", {"code": f"{element.name} := {element.ports['number']}"})
         case "Again":
             return ElementTree.Element("Sleep", {"msec": "1", "name": "tick again"})
         case "Condition" | "Action":
@@ -243,7 +263,7 @@ or "Action", which runs until a primitive has ended. These are the leaves:
 {leaves}
 """
 
-from operator import eq
+from operator import ge, lt
 
 from py_trees.behaviours import CheckBlackboardVariableValue, Running, SetBlackboardVariable
 from py_trees.common import ComparisonExpression, ParallelPolicy
@@ -251,12 +271,12 @@ from py_trees.composites import Parallel, Selector, Sequence
 from py_trees.decorators import Retry
 
 
-def check(name):
-    return CheckBlackboardVariableValue(name, ComparisonExpression(name, True, eq))
+def check(name, number, comparison):
+    return CheckBlackboardVariableValue(name, ComparisonExpression(name, number, comparison))
 
 
-def mark(name, value):
-    return SetBlackboardVariable(name, name, value, overwrite=True)
+def assign(name, number):
+    return SetBlackboardVariable(name, name, number, overwrite=True)
 
 
 def parallel(*children):
@@ -273,8 +293,7 @@ def to_py_trees(tree: Tree) -> str:
     text = HEAD.format(leaves="\n".join(leaves))
     for name, element in tree.subtrees.items():
         text += f"def {names[name]}(leaf):  # {name}\n    return {_python(element, names, 1)}\n\n\n"
-    first = names[next(iter(tree.subtrees))]
-    return text + f'def tree(leaf):\n    return Retry("retry", {first}(leaf), {RETRIES})\n'
+    return text + f'def tree(leaf):\n    return Retry("retry", {_python(attempt(tree), names, 1)}, {RETRIES})\n'
 
 
 def _python(element: Element, names: Mapping[str, str], depth: int) -> str:
@@ -286,9 +305,10 @@ def _python(element: Element, names: Mapping[str, str], depth: int) -> str:
         case "SubTree":
             return f"{names[element.name]}(leaf)"
         case "Check":
-            return f"check({element.name!r})"
+            comparison = {">=": "ge", "<": "lt"}[element.ports["comparison"]]
+            return f"check({element.name!r}, {element.ports['number']}, {comparison})"
         case "Set":
-            return f"mark({element.name!r}, {element.ports['value'] == 'true'})"
+            return f"assign({element.name!r}, {element.ports['number']})"
         case "Again":
             return 'Running("tick again")'
         case "Condition" | "Action":

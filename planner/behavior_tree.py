@@ -1,17 +1,23 @@
 """A plan as a reactive behaviour tree; if a disturbance undoes a step, the tree repeats the step.
 
-Each step becomes a fallback with two children: the first child tests whether the effects of the step already hold, and the
-second child tests the conditions of the step and executes the step. The facts that the tree must establish are those of causal
-links between two primitives, or from a primitive to the goal (`confab.planner.causal_links`). A link is satisfied if the fact
-holds, or if the later primitive has been executed. Therefore a primitive is repeated if and only if a later primitive still
-requires its effects. At the beginning of each tick, the completed primitives are marked, from the last to the first. After each
-primitive the tree is ticked again. Steps are ticked in the order of the plan; sibling steps are parallel if they have different
-workers and their primitives neither require nor disturb one another. The steps below an abstract step are a subtree.
+The facts that the tree must establish are those of causal links between two primitives, or from a primitive to the goal
+(`confab.planner.causal_links`). Each required primitive has a mark, which states that the primitive is done.
+
+An attempt begins with the latest position of the plan at which the facts of all links across this position hold (the kernels of
+Fikes, Hart and Nilsson, 1972); the primitives before it are marked. A primitive is also marked when it has been executed. In each
+tick, from the last primitive to the first, the mark is taken from each primitive with a link of which neither the fact holds nor
+the later primitive is marked. Therefore a primitive is repeated if and only if a later primitive, or the goal, requires its
+effects. If a tick fails, because no step restores what a later step requires, the next attempt begins.
+
+Steps are ticked in the order of the plan, and after each primitive the tree is ticked again. Each step is a fallback: the step is
+done; or what later steps and the goal require of it holds already, and its primitives are marked; or it is executed. Sibling steps
+are parallel if they have different workers and their primitives neither require nor disturb one another. The steps below an
+abstract step are a subtree.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
@@ -22,10 +28,10 @@ import networkx
 from confab.planner.acting.schedule import PartialOrder, partial_order, worker_of, workers_of
 from confab.planner.causal_links import FactChange, Need, NeedKind, Purpose, purposes
 from confab.planner.plan import Plan, Step
-from confab.planner.validation import BehaviorReader, LoggedState, followed
+from confab.planner.validation import BehaviorReader, LoggedState, followed, unmet_goals
 from confab.reasoner.amounts import meets
 from confab.reasoner.limits import check
-from confab.reasoner.symbols import Condition, Fact, Problem, State, Symbol
+from confab.reasoner.symbols import Condition, Fact, Problem, State, Symbol, ValueCondition
 
 
 @dataclass(frozen=True)
@@ -38,24 +44,26 @@ class Holds:
 
 @dataclass(frozen=True)
 class Do:
-    """An action leaf: if its preconditions hold, a primitive is executed, and then the tree is ticked again."""
+    """An action leaf: a primitive is executed if its preconditions hold, and marked as done; then the tree is ticked again."""
 
     step: Step
 
 
 @dataclass(frozen=True)
-class Marked:
-    """A condition leaf that succeeds if the step at a path was marked as done in this tick."""
+class Check:
+    """A condition leaf that compares a variable of the tree with a number: >= or <."""
 
-    path: Path
+    variable: str
+    comparison: str
+    number: int
 
 
 @dataclass(frozen=True)
-class Mark:
-    """A node that marks the step at a path as done, or not done, after its child succeeds or fails; the node itself succeeds."""
+class Assign:
+    """A node that gives a number to a variable of the tree, and succeeds."""
 
-    path: Path
-    child: TreeNode
+    variable: str
+    number: int
 
 
 @dataclass(frozen=True)
@@ -81,29 +89,48 @@ class Together:
 
 @dataclass(frozen=True)
 class Subtree:
-    """A named subtree: the whole tree, the nodes that mark completed steps, or the sub-steps of a step."""
+    """A named subtree: an attempt, the nodes that find its first position or take marks away, or the sub-steps of a step."""
 
     name: str
     child: TreeNode
 
 
 Path: TypeAlias = "tuple[int, ...]"
-TreeNode: TypeAlias = "Holds | Do | Marked | Mark | All | First | Together | Subtree"
+TreeNode: TypeAlias = "Holds | Do | Check | Assign | All | First | Together | Subtree"
 
 
-def behavior_tree(problem: Problem, plan: Plan) -> Subtree:
-    """Return the behaviour tree of a valid plan, which begins in the problem's initial state."""
+POSITION = "position"
+"""The variable with the number of primitives that are done when an attempt begins."""
+
+
+def done(path: Path) -> Check:
+    """Return the condition that the primitive at a path is marked as done."""
+    return Check("done_" + "_".join(map(str, path)), ">=", 1)
+
+
+def mark(path: Path, number: int) -> Assign:
+    """Return the node that marks the primitive at a path as done (1), or takes the mark away (0)."""
+    return Assign(done(path).variable, number)
+
+
+def behavior_tree(problem: Problem, plan: Plan) -> tuple[Subtree, Subtree]:
+    """Return two trees of a valid plan: one finds the position at which an attempt begins, the other is ticked until it succeeds.
+
+    The plan begins in the problem's initial state. The trees ignore the soft goals that the plan leaves unmet.
+    """
+    problem = problem.only(unmet_goals(problem, plan))
     tree = _TreeBuilder(problem, plan)
     goal = Holds((*(Fact(symbol, value) for symbol, value in sorted(problem.goal.items())), *tree.at_rest()))
-    marking = Subtree("completed steps", All(tree.marks()))
-    return Subtree("plan", First((goal, All((marking, *tree.in_order(plan.steps), goal)))))
+    marking = Subtree("undone steps", All(tree.unmarking()))
+    attempt = First((goal, All((marking, *tree.in_order(plan.steps), goal))))
+    return Subtree("position", All(tuple(tree.positioning()))), Subtree("plan", attempt)
 
 
 def children(node: TreeNode) -> tuple[TreeNode, ...]:
     """Return the children of a node."""
     if isinstance(node, All | First | Together):
         return node.children
-    return (node.child,) if isinstance(node, Subtree | Mark) else ()
+    return (node.child,) if isinstance(node, Subtree) else ()
 
 
 class _TreeBuilder:
@@ -113,16 +140,15 @@ class _TreeBuilder:
         self.problem = problem
         primitives = plan.primitives
         self.purposes: Mapping[Path, Purpose] = purposes(problem, Plan(primitives))
-        asked_above = _abstract_links(self.purposes, purposes(problem, plan), plan)
         self.needs: dict[Path, list[Need]] = {}
         for step in reversed(primitives):  # a primitive required only by superfluous steps is superfluous
-            needs = dict.fromkeys(self.purposes[step.path].needs)
-            for change, consumers in asked_above.get(step.path, ()):
-                needs |= {
-                    Need(NeedKind.LATER, (change,), by): None for by in [b for b in consumers if self.needs.get(b)][:1]
-                }
+            needs = self.purposes[step.path].needs
             self.needs[step.path] = [need for need in needs if not need.by or self.needs.get(need.by)]
         self.position = {step.path: number for number, step in enumerate(primitives)}
+        self.changed: dict[Symbol, list[int]] = {}
+        for path, number in self.position.items():
+            for change in self.purposes[path].gives:
+                self.changed.setdefault(change.fact.symbol, []).append(number)
         self.order: PartialOrder = partial_order(problem, primitives)
         self.workers = workers_of(problem)
 
@@ -134,10 +160,28 @@ class _TreeBuilder:
         rests = ((symbol, self.problem.domain.situations[symbol.situation].rest) for symbol in sorted(changed))
         return [Fact(symbol, rest) for symbol, rest in rests if rest is not None and symbol not in self.problem.goal]
 
-    def marks(self) -> tuple[TreeNode, ...]:
-        """Return the nodes that mark the required primitives as done, the last primitive first."""
+    def positioning(self) -> list[TreeNode]:
+        """Return the nodes that find the latest position at which all links across it are satisfied, and set the marks.
+
+        The links are tested from the last consumer to the first. Therefore each link has to be tested only once.
+        """
+        end = len(self.position)
+        links = [(self.position.get(need.by, end), path, need) for path in self.position for need in self.needs[path]]
+        nodes: list[TreeNode] = [Assign(POSITION, end)]
+        for consumer, path, need in sorted(links, key=lambda link: link[:2], reverse=True):
+            producer = self.position[path]
+            within = Check(POSITION, "<", producer + 1), *([Check(POSITION, ">=", consumer + 1)] if need.by else [])
+            nodes.append(First((*within, self.facts(path, need), Assign(POSITION, producer))))
+        for path, number in self.position.items():
+            if self.needs[path]:
+                nodes.append(mark(path, 0))
+                nodes.append(First((Check(POSITION, "<", number + 1), mark(path, 1))))
+        return nodes
+
+    def unmarking(self) -> tuple[TreeNode, ...]:
+        """Return the nodes that take the marks from primitives with unsatisfied links, the last primitive first."""
         needed = [path for path in self.position if self.needs[path]]
-        return tuple(Mark(path, self.kept(path)) for path in reversed(needed))
+        return tuple(First((self.kept([path]), mark(path, 0))) for path in reversed(needed))
 
     def in_order(self, steps: Iterable[Step]) -> tuple[TreeNode, ...]:
         """Return the nodes of sibling steps; consecutive steps that are independent are parallel."""
@@ -154,17 +198,17 @@ class _TreeBuilder:
             self.node(group[0]) if len(group) == 1 else Together(tuple(map(self.node, group))) for group in groups
         )
 
-    def needed(self, step: Step) -> list[Step]:
-        """Return the primitives of a step that are required."""
-        return [below for below in Plan((step,)).primitives if self.needs[below.path]]
+    def needed(self, step: Step) -> list[Path]:
+        """Return the paths of the primitives of a step that are required."""
+        return [below.path for below in Plan((step,)).primitives if self.needs[below.path]]
 
     def node(self, step: Step) -> TreeNode:
         """Return the fallback node of a step."""
-        if not step.steps:
-            return First((self.kept(step.path), Do(step)))
-        guard = All(tuple(self.kept(below.path) for below in self.needed(step)))
+        paths = self.needed(step)
+        finished = All(tuple(map(done, paths)))
+        early = All((self.kept(paths), *(mark(path, 1) for path in paths)))
         name = f"{step} at {'.'.join(map(str, step.path))}"
-        return First((guard, Subtree(name, All(self.in_order(step.steps)))))
+        return First((finished, early, Subtree(name, All(self.in_order(step.steps))) if step.steps else Do(step)))
 
     def independent(self, one: Step, other: Step) -> bool:
         """Return whether no primitive of one step waits for a primitive of the other, and their workers differ."""
@@ -177,18 +221,34 @@ class _TreeBuilder:
 
     # ------------------------------------------------------------------------------------------------ purposes of the steps
 
-    def kept(self, path: Path) -> TreeNode:
-        """Return the condition that all causal links from a primitive are satisfied."""
-        links = tuple(dict.fromkeys(map(self.link, self.needs[path])))
-        return links[0] if len(links) == 1 else All(links)
+    def kept(self, paths: Collection[Path]) -> TreeNode:
+        """Return the condition that all causal links from some primitives to other primitives and to the goal are satisfied."""
+        links = [(path, need) for path in paths for need in self.needs[path] if need.by not in paths]
+        nodes = tuple(dict.fromkeys(self.link(path, need) for path, need in links))
+        return nodes[0] if len(nodes) == 1 else All(nodes)
 
-    def link(self, need: Need) -> TreeNode:
+    def link(self, path: Path, need: Need) -> TreeNode:
         """Return the condition that a causal link is satisfied: the later step is done, or the link's facts or conditions hold."""
-        kept: list[TreeNode] = [Marked(need.by)] if need.by else []
-        kept.append(Holds(tuple(self.wanted(change, need.kind) for change in need.gives)))
+        facts = self.facts(path, need)
+        return First((done(need.by), facts)) if need.by else facts
+
+    def facts(self, path: Path, need: Need) -> TreeNode:
+        """Return the condition that the facts of a causal link, or the conditions of the later step, hold.
+
+        If a step between the two steps changes a symbol again, the symbol may have any value except the one from before the link.
+        """
+        between = range(self.position[path] + 1, self.position.get(need.by, len(self.position)))
+        facts, conditions = list[Fact](), list[Condition]()
+        for change in need.gives:
+            symbol = change.fact.symbol
+            if any(number in between for number in self.changed[symbol]) and not self.is_amount(symbol):
+                conditions.append(ValueCondition(symbol.situation, symbol.arguments, change.before, negated=True))
+            else:
+                facts.append(self.wanted(change, need.kind))
+        held = Holds(tuple(facts), tuple(conditions))
         if need.conditions and not any(self.is_amount(change.fact.symbol) for change in need.gives):
-            kept.append(Holds(conditions=need.conditions))
-        return kept[0] if len(kept) == 1 else First(tuple(kept))
+            return First((held, Holds(conditions=need.conditions)))
+        return held
 
     def is_amount(self, symbol: Symbol) -> bool:
         """Return whether the values of a symbol are numbers."""
@@ -204,30 +264,6 @@ class _TreeBuilder:
         return Fact(symbol, f">={value}" if Fraction(value) > Fraction(change.before) else f"<={value}")
 
 
-def _abstract_links(
-    below: Mapping[Path, Purpose], whole: Mapping[Path, Purpose], plan: Plan
-) -> dict[Path, list[tuple[FactChange, list[Path]]]]:
-    """Return the causal links between abstract steps: each link has a fact, and the primitives at which the link may end.
-
-    A link between abstract steps begins with the primitive that makes its fact true. The link ends with the first
-    primitive of the later step that changes the fact, otherwise with the last required primitive of the later step.
-    """
-    under = {step.path: [primitive.path for primitive in Plan((step,)).primitives] for step in plan.walk()}
-    found: dict[Path, list[tuple[FactChange, list[Path]]]] = {}
-    for path, purpose in whole.items():
-        for need in purpose.needs if under[path] != [path] else ():
-            for change in need.gives if need.kind is NeedKind.LATER else ():
-                writers = [one for one in under[path] if _changes(below[one], change.fact.symbol)]
-                consumers = [one for one in under[need.by] if _changes(below[one], change.fact.symbol)]
-                if writers:
-                    found.setdefault(writers[-1], []).append((change, [*consumers[:1], *reversed(under[need.by])]))
-    return found
-
-
-def _changes(purpose: Purpose, symbol: Symbol) -> bool:
-    return any(change.fact.symbol == symbol for change in purpose.gives)
-
-
 # ------------------------------------------------------------------------------------------------------------- evaluation
 
 
@@ -241,8 +277,8 @@ class Situation:
 
     def holds(self, leaf: Holds) -> bool:
         """Return whether all facts or conditions of a leaf hold."""
-        if leaf.conditions:
-            return self.rules.satisfied(leaf.conditions, {}, {}, self.facts) is not None
+        if leaf.conditions and self.rules.satisfied(leaf.conditions, {}, {}, self.facts) is None:
+            return False
         return all(self.is_so(fact) for fact in leaf.facts)
 
     def is_so(self, fact: Fact) -> bool:

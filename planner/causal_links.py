@@ -16,6 +16,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum
 from fractions import Fraction
+from operator import itemgetter
 from typing import TypeVar
 
 from confab.planner.checked_conditions import Arguments
@@ -149,7 +150,7 @@ class _LevelExecution:
             for path, group in self.groups.items():
                 if group.steps[0].path == step.path:
                     open_[path] = number, len(self.facts.log), self.changes(group) or {}
-            for writer, changes, conditions, differs in self.needs_of(step):
+            for writer, changes, conditions, differs in sorted(self.needs_of(step), key=itemgetter(0)):
                 if conditions or not differs:
                     found.append((self.steps[writer].path, Need(NeedKind.LATER, changes, step.path, conditions)))
                 else:
@@ -225,17 +226,23 @@ class _LevelExecution:
     ) -> Iterator[tuple[int, T]]:
         """Yield the steps without whose changes of some symbols a result would differ, with the result for these values.
 
-        The symbols that a step has written are tested one by one, and together if none of them matters alone.
+        The symbols that a step has written are tested one by one, and together if none of them matters alone. If the last change of
+        a symbol doesn't matter, the change before it is tested.
         """
         by: dict[int, dict[Cell, str]] = {}
         for cell in read:
             for giver, before in self.written[cell].items():
                 by.setdefault(giver, {})[cell] = before
-        for writer, without in sorted(by.items()):
-            found = [one for cell, before in without.items() if (one := result({cell: before})) is not None]
-            if not found and len(without) > 1:
-                found = [one for one in [result(without)] if one is not None]
-            yield from ((writer, one) for one in found)
+        settled = set[Cell]()
+        for writer, written in sorted(by.items(), reverse=True):
+            without = {cell: before for cell, before in written.items() if cell not in settled}
+            found: dict[tuple[Cell, ...], T] = {
+                (cell,): one for cell, before in without.items() if (one := result({cell: before})) is not None
+            }
+            if not found and len(without) > 1 and (one := result(without)) is not None:
+                found = {(*without,): one}
+            settled.update(cell for cells in found for cell in cells if not self.counted(cell))
+            yield from ((writer, one) for one in found.values())
 
     @contextmanager
     def reset(self, without: Mapping[Cell, str]) -> Iterator[tuple[FactChange, ...]]:
@@ -282,12 +289,14 @@ class _LevelExecution:
     def givers(self, number: int, step: Step, cell: Cell, now: str) -> dict[int, str]:
         """Return the steps that gave a symbol its value `now`, with the value that `step` would leave without each of them.
 
-        The givers of an amount are the last step that increased and the last step that decreased it. The state is the one before
-        `step`.
+        The givers of an amount are the last step that increased and the last step that decreased it. The other givers are `step`,
+        and the last step that ended each other earlier value. The state is the one before `step`.
         """
         before = str(self.facts.value(*cell))
         found = {number: before}
-        if self.counted(cell) and before != now:
+        if not self.counted(cell):
+            found |= {giver: old for giver, old in self.written.get(cell, {}).items() if old not in (before, now)}
+        elif before != now:
             rises = Fraction(before) < Fraction(now)
             for giver, old in self.written.get(cell, {}).items():
                 if (Fraction(old) < Fraction(before)) != rises:
@@ -342,7 +351,9 @@ class _LevelExecution:
                 why = NeedKind.REST
             else:
                 continue
-            for giver, without in self.written.get(cell, {}).items():
+            givers = self.written.get(cell, {})
+            for giver in givers if self.counted(cell) else [max(givers, default=-1)]:
+                without = givers.get(giver, value)
                 met = why is not NeedKind.REST and self.counted(cell) and meets(without, wanted.get(cell, value))
                 if giver >= first and not met:
                     yield self.steps[giver].path, Need(why, (FactChange(Fact(symbol, value), without),), path)
