@@ -250,8 +250,16 @@ class _SoftGoalChoices:
         if len(some) == 1:
             self.briefly = dict.fromkeys(some, self.outcome(some[0]))
             return some[0]
-        self.briefly = {kept: shorten(self.task(kept), self.outcome(kept), True) for kept in some}
+        self.briefly = {kept: self.shorter(kept, self.outcome(kept), shorten, briefly=True) for kept in some}
         return min(some, key=lambda kept: self.price(self.briefly[kept]) + self.unmet(kept))
+
+    def shorter(self, kept: Goals, found: Outcome, shorten: Shortener, briefly: bool) -> Outcome:
+        """Return the outcome of a choice with a shortened plan, or the outcome itself if no time is left for shortening."""
+        try:
+            other = shorten(self.task(kept), found, briefly)
+        except LimitError:
+            return found
+        return found if other.plan is None else other
 
     def cheapest(self, best: Goals) -> tuple[Goals, Fraction]:
         """Return the cheapest choice found, at least as cheap as `best`, and a lower bound on the total cost of any choice.
@@ -304,7 +312,7 @@ class _SoftGoalChoices:
                         longer = other
                         break
         if shorten is not None:
-            outcome = shorten(self.task(kept), outcome, False)
+            outcome = self.shorter(kept, outcome, shorten, briefly=False)
             kept = self.met(outcome)
         cost, forgone = self.price(outcome), []
         for symbol, longer_cost in more.items():

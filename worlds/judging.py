@@ -292,9 +292,9 @@ class Judge:
         if self.sampled(EXECUTIONS, "execute", "execute"):
             self.execution(read, guarded)
         if self.sampled(RECOGNITION, "recognition", "recognition"):
-            self.call("recognition", lambda: self.recognition(self.slices(read)), COMPARING)
+            self.recognition("recognition", lambda: self.slices(read))
             self.call("recognition of names", lambda: self.names(self.renamed(file)))
-            self.call("recognition of a crowd", lambda: self.recognition(self.crowd(file)), COMPARING)
+            self.recognition("recognition of a crowd", lambda: self.crowd(file))
 
     def outcome(self, read: Scene, name: str, **options: Any) -> Outcome | None:
         """Plan in one mode, compare the outcome with the exhaustive search, and return the outcome."""
@@ -458,12 +458,19 @@ class Judge:
                     self.complain("the checker has another successor", "checker", f"{name} {arguments} in {before}")
                     return
 
-    def recognition(self, slices: Iterable[Slice]) -> None:
-        """Compare parts of scenes that task recognition selects with the whole scenes."""
-        for one in slices:
-            if said := one.wrong(one.part()):
-                text = f"{one.goals}, {one.queries} queries: {said}"
-                self.complain("the part of the scene differs", "recognition", text)
+    def recognition(self, mode: str, slices: Callable[[], Iterable[Slice]]) -> None:
+        """Compare parts of scenes that task recognition selects with the whole scenes; a long comparison is a remark."""
+        for one in self.call(mode, lambda: list(slices()), COMPARING) or ():
+            part = self.call(mode, one.part)
+            try:
+                with limited(COMPARING):
+                    said = "" if part is None else one.wrong(part)
+            except EndlessError:
+                self.found.remarks.append(Complaint("not compared", mode, ""))
+            else:
+                if said:
+                    text = f"{one.goals}, {one.queries} queries: {said}"
+                    self.complain("the part of the scene differs", "recognition", text)
 
     def slices(self, read: Scene) -> Iterator[Slice]:
         """Yield the comparisons of task recognition with the whole scene, for the task and for another goal."""
@@ -569,7 +576,7 @@ class Judge:
             proof = states.text if isinstance(states, Reason) else None
         except UnsolvableError as error:
             proof = error.reason.text
-        if proof is not None and self.surely is not None:
+        if proof is not None and self.found.least is not None:
             self.complain("a proof although there is a plan", "proofs by a search", proof)
         if proof is None and self.surely is None and self.found.known:
             self.found.remarks.append(Complaint("no proof", "proofs by a search", ""))

@@ -87,6 +87,17 @@ def test_after_the_end_of_the_time_no_further_choice_is_searched(proving: bool) 
     assert len(searched) == (4 if proving else 3)
 
 
+@pytest.mark.parametrize("late", [OutOfTimeError("the time limit"), Outcome(Status.GAVE_UP)])
+def test_a_plan_is_kept_if_no_time_is_left_for_shortening_it(late: OutOfTimeError | Outcome) -> None:
+    def shorten(*_: object) -> Outcome:
+        if isinstance(late, Outcome):
+            return late
+        raise late
+
+    _, outcome = preferred(confab.load("wishes-small").problem, default, shorten=shorten)
+    assert outcome.status is Status.SOLVED
+
+
 def test_an_unmet_goal_with_alternatives_is_reported_with_its_conditions(tmp_path: Path) -> None:
     old = 'c:Comparison ; c:weight 8.0 ; c:about :store ; c:situationType d:STOCK ; c:sign "=" ; c:amount 0.0'
     none, one = (
