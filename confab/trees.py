@@ -15,7 +15,7 @@ from confab.planner.acting.world import World
 from confab.planner.behavior_tree import (
     All,
     Assign,
-    Compare,
+    Compared,
     Do,
     First,
     Holds,
@@ -142,7 +142,7 @@ class _ElementWriter:
                 possible = self.leaf("Condition", f"{name}_possible", ports, step)
                 once = Element("Once", children=(possible, self.leaf("Action", name, ports, step)))
                 return Element("Sequence", children=(once, self.lowered(mark(step.path, 1)), Element("Again")))
-            case Compare(variable, comparison, number):
+            case Compared(variable, comparison, number):
                 return Element("Check", variable, ports={"comparison": comparison, "number": str(number)})
             case Assign(variable, number):
                 return Element("Set", variable, ports={"number": str(number)})

@@ -50,7 +50,7 @@ class Do:
 
 
 @dataclass(frozen=True)
-class Compare:
+class Compared:
     """A condition leaf that compares a variable of the tree with a number: >= or <."""
 
     variable: str
@@ -96,16 +96,16 @@ class Subtree:
 
 
 Path: TypeAlias = "tuple[int, ...]"
-TreeNode: TypeAlias = "Holds | Do | Compare | Assign | All | First | Together | Subtree"
+TreeNode: TypeAlias = "Holds | Do | Compared | Assign | All | First | Together | Subtree"
 
 
 POSITION = "position"
 """The variable with the number of primitives that are done when an attempt begins."""
 
 
-def done(path: Path) -> Compare:
+def done(path: Path) -> Compared:
     """Return the condition that the primitive at a path is marked as done."""
-    return Compare("done_" + "_".join(map(str, path)), ">=", 1)
+    return Compared("done_" + "_".join(map(str, path)), ">=", 1)
 
 
 def mark(path: Path, number: int) -> Assign:
@@ -170,12 +170,15 @@ class _TreeBuilder:
         nodes: list[TreeNode] = [Assign(POSITION, end)]
         for consumer, path, need in sorted(links, key=lambda link: link[:2], reverse=True):
             producer = self.position[path]
-            within = Compare(POSITION, "<", producer + 1), *([Compare(POSITION, ">=", consumer + 1)] if need.by else [])
+            within = (
+                Compared(POSITION, "<", producer + 1),
+                *([Compared(POSITION, ">=", consumer + 1)] if need.by else []),
+            )
             nodes.append(First((*within, self.facts(path, need), Assign(POSITION, producer))))
         for path, number in self.position.items():
             if self.needs[path]:
                 nodes.append(mark(path, 0))
-                nodes.append(First((Compare(POSITION, "<", number + 1), mark(path, 1))))
+                nodes.append(First((Compared(POSITION, "<", number + 1), mark(path, 1))))
         return nodes
 
     def unmarking(self) -> tuple[TreeNode, ...]:
