@@ -15,7 +15,7 @@ from functools import cached_property
 from itertools import count, product
 from typing import TypeAlias
 
-from confab.reasoner.amounts import Amount, Calculation, Expression, put_in, situations_in, terms_of
+from confab.reasoner.amounts import Amount, Calculation, Expression, after_effect, put_in, situations_in, terms_of
 from confab.reasoner.language import groups, is_variable, mentions, situations_of, walk
 from confab.reasoner.symbols import (
     FALSE,
@@ -358,7 +358,7 @@ class Afterwards:
                     if apart.each is not None:
                         by = put_in(by, {apart.each.name: arguments[apart.arguments.index(apart.each.name)]})
                     done = [
-                        (both([*when, *fires]), _changed(now, apart.operation, by))
+                        (both([*when, *fires]), after_effect(now, apart.operation, by))
                         for when, now in found
                         if when is not None
                     ]
@@ -377,11 +377,6 @@ class Afterwards:
 def _bounded(cases: Sequence[object]) -> None:
     if len(cases) > MOST_CASES:
         raise TooManyCasesError
-
-
-def _changed(now: Expression, operation: str, by: Expression) -> Expression:
-    sign = {"scale": "*", "increase": "+", "decrease": "-"}.get(operation)
-    return by if sign is None else Calculation(sign, now, by)
 
 
 def closed(conditions: Iterable[Condition], bound: frozenset[str], kinds: Mapping[str, str]) -> tuple[Condition, ...]:

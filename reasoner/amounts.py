@@ -131,6 +131,20 @@ def put_in(expression: Expression, terms: Mapping[str, str]) -> Expression:
     return expression
 
 
+def with_amounts(expression: Expression, values: Mapping[Amount, Expression]) -> Expression:
+    """Return an expression in which `values` maps amounts to their replacements."""
+    if isinstance(expression, Calculation):
+        left, right = with_amounts(expression.left, values), with_amounts(expression.right, values)
+        return Calculation(expression.operator, left, right)
+    return values.get(expression, expression) if isinstance(expression, Amount) else expression
+
+
+def after_effect(now: Expression, operation: str, by: Expression) -> Expression:
+    """Return the expression for an amount after an effect, given the expression before the effect."""
+    sign = {"scale": "*", "increase": "+", "decrease": "-"}.get(operation)
+    return by if sign is None else Calculation(sign, now, by)
+
+
 @lru_cache(maxsize=2**16)
 def number(text: str | None) -> Number:
     """Return the number that a text denotes, or `NOTHING` for None."""

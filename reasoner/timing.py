@@ -8,17 +8,27 @@ condition must hold and when each effect takes place.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 
-from confab.reasoner.amounts import situations_in
+from confab.reasoner.amounts import (
+    COMPARING,
+    OPERATIONS,
+    Amount,
+    Expression,
+    after_effect,
+    inside,
+    situations_in,
+    with_amounts,
+)
 from confab.reasoner.language import walk
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AmountEffect,
     Behavior,
+    Comparison,
     Condition,
     Effect,
     Problem,
@@ -45,28 +55,64 @@ def projected(
 ) -> tuple[tuple[Condition, ...], tuple[Effect, ...]]:
     """Return the preconditions and effects of a behaviour that no other step overlaps.
 
-    A condition that an effect at the start achieves is omitted; an effect at the start that a later effect overwrites is omitted,
-    too. Increases, decreases and factors overwrite nothing, and equal ones add up.
+    A condition that earlier effects of the behaviour achieve is omitted; a condition on amounts that earlier effects change becomes
+    a condition on the amounts before the behaviour. An effect that a later effect overwrites is omitted. Increases, decreases and
+    factors overwrite nothing, and equal ones add up.
     """
-    given = {effect for span, effect in effects if span is Span.START and isinstance(effect, ValueEffect)}
-    later = {
-        (e.situation, e.arguments)
-        for span, e in effects
-        if span is not Span.START and not e.when and not e.each
-        if isinstance(e, ValueEffect) or e.operation == "assign"
-    }
+    spans = tuple(Span)
 
-    def brought_about(span: Span, condition: Condition) -> bool:
-        return (
-            span is not Span.START
-            and isinstance(condition, ValueCondition)
-            and not condition.negated
-            and ValueEffect(condition.situation, condition.arguments, condition.value) in given
+    def overwritten(span: Span, effect: Effect) -> bool:
+        return any(
+            spans.index(other) > spans.index(span)
+            and (e.situation, e.arguments) == (effect.situation, effect.arguments)
+            for other, e in effects
+            if (isinstance(e, ValueEffect) or e.operation == "assign") and not e.when and not e.each
         )
 
-    asked = tuple(dict.fromkeys(c for span, c in conditions if not brought_about(span, c)))
-    made = tuple(e for span, e in effects if span is not Span.START or (e.situation, e.arguments) not in later)
-    return asked, made
+    certain = {span: [e for its, e in effects if its is span and not e.when and not e.each] for span in spans}
+    asked = dict[Condition, None]()
+    for span, condition in conditions:
+        before = [certain[earlier] for earlier in reversed(spans[: spans.index(span)])]
+        if isinstance(condition, ValueCondition):
+            asked |= dict.fromkeys(() if _achieved(condition, before) else (condition,))
+        elif isinstance(condition, Comparison):
+            asked |= dict.fromkeys(_compared_before(condition, before))
+        else:
+            asked[condition] = None
+    return tuple(asked), tuple(effect for span, effect in effects if not overwritten(span, effect))
+
+
+def _achieved(condition: ValueCondition, effects: Iterable[Sequence[Effect]]) -> bool:
+    """Return whether effects achieve a condition; the latest effects come first."""
+    cell, wanted = (condition.situation, condition.arguments), condition.value
+    for made in effects:
+        values = [e.value for e in made if isinstance(e, ValueEffect) and (e.situation, e.arguments) == cell]
+        if values:
+            unlike = any(value != wanted and "?" not in (value[0], wanted[0]) for value in values)
+            return unlike if condition.negated else wanted in values
+    return False
+
+
+def _compared_before(condition: Comparison, effects: Iterable[Sequence[Effect]]) -> tuple[Condition, ...]:
+    """Return the conditions under which a comparison holds after effects; the latest effects come first."""
+    left, right, there = condition.left, condition.right, dict[Amount, None]()
+    for made in effects:
+        after = dict[Amount, Expression]()
+        amounts = [effect for effect in made if isinstance(effect, AmountEffect)]
+        for effect in sorted(amounts, key=lambda one: OPERATIONS.index(one.operation)):
+            cell = Amount(effect.situation, effect.arguments)
+            after[cell] = after_effect(after.get(cell, cell), effect.operation, effect.amount)
+        there |= dict.fromkeys(
+            part for one in (left, right) for part in inside(one) if isinstance(part, Amount) and part in after
+        )
+        left, right = with_amounts(left, after), with_amounts(right, after)
+    if not there:
+        return (condition,)
+    found: list[Condition] = [Comparison(cell, "=", cell) for cell in there]  # no effect changes a missing amount
+    fixed = isinstance(left, Fraction) and isinstance(right, Fraction)
+    if not fixed or COMPARING[condition.operator](left, right) is condition.negated:  # type: ignore[arg-type]
+        found.append(replace(condition, left=left, right=right))
+    return tuple(found)
 
 
 def only_during(problem: Problem) -> frozenset[str]:

@@ -206,7 +206,9 @@ class _Cut:
         free = [ValueCondition(*cell, FALSE) for cell in marks]
         made = (*timing.made(Span.START), *(ValueEffect(*cell, TRUE) for cell in marks))
         yield _behavior(behavior, behavior.name + BEGIN, (*asked, *free), made)
-        held = (*timing.asked(Span.THROUGHOUT), *timing.asked(Span.END))
+        pending = [(Span.THROUGHOUT, e) for e in timing.made(Span.THROUGHOUT)]
+        last, _ = projected([(Span.END, c) for c in timing.asked(Span.END)], pending)
+        held = (*timing.asked(Span.THROUGHOUT), *last)
         made = (*timing.made(Span.THROUGHOUT), *timing.made(Span.END), *(ValueEffect(*cell, FALSE) for cell in marks))
         ended = _behavior(behavior, behavior.name + END, (*held, replace(free[0], value=TRUE)), made)
         yield replace(ended, cost=0.0, price=None)

@@ -23,7 +23,7 @@ from itertools import chain, product
 
 import pyoxigraph as ox
 
-from confab.reasoner.amounts import Amount, Calculation, Expression, Measure
+from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, after_effect
 from confab.reasoner.derivation import circular, strata
 from confab.reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph, text
 from confab.reasoner.limits import checked
@@ -54,7 +54,6 @@ SITUATION = BASE + "situation"
 RELATION_PROPERTIES = (
     "SELECT DISTINCT ?relation WHERE { ?relation a/rdfs:subClassOf* :Relation ; a owl:ObjectProperty }"
 )
-SIGNS = {"increase": "+", "decrease": "-", "scale": "*"}
 MOST_TOGETHER = 3
 """Maximum number of other effects on an amount. If a behaviour has more, the query doesn't test the bounds of the amount."""
 
@@ -142,10 +141,8 @@ def allowed_together(behavior: Behavior, situations: Mapping[str, SituationType]
                 total: Expression = before
                 # in the order in which they are applied
                 for one in (one for one in behavior.amounts if one in together):
-                    total = (
-                        Calculation(SIGNS[one.operation], total, one.amount) if one.operation in SIGNS else one.amount
-                    )
-                if any(one.operation not in SIGNS for one in together):
+                    total = after_effect(total, one.operation, one.amount)
+                if any(one.operation == "assign" for one in together):
                     where.append(Comparison(before, "=", before))  # an amount that doesn't exist isn't assigned
                 for wrong, limit in (("<", quantity.least), (">", quantity.most)):
                     if limit is not None:

@@ -9,15 +9,20 @@ import pytest
 import confab
 from confab.planner.certificate_checks import refusal
 from confab.planner.certifying import certify
-from confab.planner.plan import Limits, Outcome, Plan, Status, Step
+from confab.planner.plan import Limits, Outcome, Status
 from confab.planner.solve import Request, solve
-from confab.planner.timed.plan import Slot, TimedPlan, schedule_of
+from confab.planner.timed.call import best_in_time
+from confab.planner.timed.plan import TimedPlan, schedule_of
 from confab.planner.timed.validation import validate_in_sequence, validate_timed
+from confab.reasoner.amounts import Amount, Quantity
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse
 from confab.reasoner.pddl.turtle import turtle
 from confab.reasoner.symbols import (
+    FALSE,
     TRUE,
+    AmountEffect,
+    Comparison,
     Condition,
     Effect,
     Problem,
@@ -206,13 +211,56 @@ def test_unsolvable_random_worlds_have_no_plan_with_overlaps_either() -> None:
         assert (outcome.status is Status.UNSOLVABLE) == (least is None)
 
 
-def test_no_proof_overlooks_that_a_step_gives_what_it_needs_at_its_end() -> None:
+AFTER = (Span.END, becomes("G", "?t", TRUE))
+GIVEN: dict[str, tuple[tuple[tuple[Span, Condition], ...], tuple[tuple[Span, Effect], ...]]] = {
+    "at its begin, for its whole duration": (
+        ((Span.THROUGHOUT, has("P", "?t", TRUE)),),
+        ((Span.START, becomes("P", "?t", TRUE)), (Span.END, becomes("P", "?t", FALSE)), AFTER),
+    ),
+    "at its begin, for its end": (((Span.END, has("P", "?t", TRUE)),), ((Span.START, becomes("P", "?t", TRUE)), AFTER)),
+    "throughout, for its end": (
+        ((Span.END, has("P", "?t", TRUE)),),
+        ((Span.THROUGHOUT, becomes("P", "?t", TRUE)), AFTER),
+    ),
+    "as an amount": (
+        ((Span.THROUGHOUT, Comparison(Amount("N", ("?t",)), ">=", Fraction(2))),),
+        ((Span.START, AmountEffect("N", ("?t",), "increase", Fraction(2))), AFTER),
+    ),
+    "as an assigned amount, for its end": (
+        ((Span.END, Comparison(Amount("N", ("?t",)), "<", Fraction(1), negated=True)),),
+        ((Span.START, AmountEffect("N", ("?t",), "assign", Fraction(1))), AFTER),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", GIVEN)
+@pytest.mark.parametrize("level", [1, 2])
+def test_a_step_may_give_itself_what_it_needs(name: str, level: int) -> None:
+    problem = spanned(level, *GIVEN[name], "G")
+    plan = solve(Request(problem, limits=Limits(seconds=10.0))).plan
+    assert plan is not None
+    timed = best_in_time(problem, plan).plan
+    assert timed is not None
+    assert validate_timed(problem, timed) == []
+    assert timed.makespan == 2
+
+
+def test_what_a_step_takes_again_before_its_end_isnt_given() -> None:
     asked = ((Span.END, has("P", "?t", TRUE)),)
-    made = ((Span.THROUGHOUT, becomes("P", "?t", TRUE)), (Span.END, becomes("G", "?t", TRUE)))
-    problem = spanned(1, asked, made, "G")
-    alone = Plan((Step((0,), problem.id_of("W", ("t",)), 1, "W", ("t",)),))
-    assert validate_timed(problem, TimedPlan(alone, (Slot(alone.primitives[0], Fraction(0), Fraction(2)),))) == []
-    assert solve(Request(problem, limits=Limits(seconds=10.0))).status is not Status.UNSOLVABLE
+    made = ((Span.START, becomes("P", "?t", TRUE)), (Span.THROUGHOUT, becomes("P", "?t", FALSE)), AFTER)
+    for level in (1, 2):
+        assert solve(Request(spanned(level, asked, made, "G"), limits=Limits(seconds=10.0))).plan is None
+
+
+def test_validation_accepts_a_step_that_gives_itself_what_it_needs(tmp_path: Path) -> None:
+    text = JARS.replace("c:postcondition :PRESS.tight", "c:postcondition :PRESS.done, :PRESS.tight").replace(
+        ":SCREW a",
+        ":PRESS.done a owl:NamedIndividual, c:ValueEffect ; c:situationType :SCREWED ; c:about :PRESS.jar .\n:SCREW a",
+    )
+    (tmp_path / "jars.ttl").write_text(text, encoding="utf-8")
+    assert not [one for one in confab.validate(tmp_path / "jars.ttl") if "never applicable" in str(one)]
+    result = confab.load(tmp_path / "jars.ttl").plan("jar CLOSED true", time_limit=20)
+    assert [step.behavior for step in result.plan.primitives] == ["PRESS"]
 
 
 def test_a_task_of_several_levels_whose_steps_have_spans_is_proved_unsolvable() -> None:
@@ -230,11 +278,15 @@ def spanned(
     preconditions, effects = projected(asked, made)
     values = [effect for effect in effects if isinstance(effect, ValueEffect)]
     one = behavior("W", level, "?t:T", preconditions, values)
+    one = replace(one, amounts=tuple(effect for effect in effects if isinstance(effect, AmountEffect)))
     above = [behavior("ABOVE", 1, "?t:T", [], [becomes(goal, "?t", TRUE)])] if level > 1 else []
     return world(
-        [SituationType(name, ("T",), "Truth", boolean=True) for name in "PG"],
+        [
+            *(SituationType(name, ("T",), "Truth", boolean=True) for name in "PG"),
+            SituationType("N", ("T",), "Number", level, quantity=Quantity()),
+        ],
         [*above, replace(one, timing=Timing(Fraction(2), (), asked, made))],
         {"T": ("t",)},
-        {},
+        {"N t": "0"},
         {f"{goal} t": TRUE},
     )
