@@ -29,6 +29,7 @@ from confab.reasoner.names import RightNames, right_names
 from confab.reasoner.reading.goals import with_goals
 from confab.reasoner.reading.problem import Reading
 from confab.reasoner.symbols import Fact, Problem
+from confab.reasoner.timing import may_overlap_by_need
 from confab.timing import Minimise, lanes, needs_others_meanwhile, schedule_json
 
 if TYPE_CHECKING:
@@ -162,7 +163,11 @@ def result_of(scene: Known, plan: Plan, goals: Facts = ()) -> Result:
     if not needs_others_meanwhile(problem):
         problem = problem.only(problem.weights.keys() & unmet_goals(problem, plan))
         if faults := validate(problem, plan):
-            raise KnowledgeError(f"the plan isn't valid in this scene with these goals: {faults[0].text}")
+            alone = "; its steps are read without their times: if they have to overlap, plan again"
+            raise KnowledgeError(
+                f"the plan isn't valid in this scene with these goals: {faults[0].text}"
+                f"{alone if may_overlap_by_need(problem) else ''}"
+            )
     return Result(scene, problem, Outcome(Status.SOLVED, plan), dict(scene.seconds), goals=texts)
 
 

@@ -145,6 +145,8 @@ def test_an_imported_scene_is_planned_with_the_overlap_by_its_file_too(tmp_path:
     assert result.timed is not None
     assert result.timed.makespan == makespan
     assert result.execute().reached
+    with pytest.raises(confab.KnowledgeError, match="if they have to overlap, plan again"):
+        confab.load(tmp_path / "scene.ttl").read_result(result.save(tmp_path / "plan.json"))
 
 
 JARS = """
