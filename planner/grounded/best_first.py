@@ -12,9 +12,9 @@ and escapes plateaus of the heuristic (`confab.planner.grounded.novelty`). The p
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 
 from confab.planner.grounded.exploring import SearchOrder, explore, path_to
@@ -127,52 +127,73 @@ def search(
     most_work : float
         Maximum work, in bits processed by relaxed plans.
     """
-    counts = Counts()
-    if task.initial & task.goal == task.goal:
-        return Flat(Status.SOLVED, (), None, counts)
-    evaluate = heuristic(task)
-    begun = evaluate(task.initial)
-    if begun is None:
-        return Flat(
-            Status.UNSOLVABLE, (), Reason("the goal can't be reached even if nothing ever ceases to hold"), counts
-        )
-
-    total = 0
-
-    def gave_up(reason: Reason) -> Flat:
-        return Flat(Status.GAVE_UP, (), reason, counts, total)
-
-    novelty = Novelty(task, evaluate, begun.work, landmarks(task, deadline), counts)
-    greedy = Greedy(task, evaluate, ahead(task, deadline), counts)
-    going: dict[SearchOrder, Iterator[int]] = {order: explore(task, order) for order in (novelty, greedy)}
-    spent: dict[SearchOrder, int] = dict.fromkeys(going, 0)
-    del novelty, greedy  # releases the memory of an order that runs out of memory
-    while True:
-        order = min(going, key=spent.__getitem__)
-        try:
-            work = next(going[order])
-            spent[order] += work
-            total += work
-        except OutOfTimeError:
-            return gave_up(Reason("the time limit came first"))
-        except MemoryError:
-            del going[order], spent[order]
-            if not going:
-                return gave_up(OUT_OF_MEMORY)
-        except StopIteration:
-            break
-        if total >= most_work:
-            return gave_up(Reason("the limit of work came first"))
-        if counts.expanded >= limits.expansions:
-            return gave_up(Reason(f"the limit of {limits.expansions} expansions came first"))
-        if deadline is not None and perf_counter() > deadline:
-            return gave_up(Reason("the time limit came first"))
-    if order.best is None:
-        reason = Reason("all reachable states were searched, and none of them satisfies the goal")
-        return Flat(Status.UNSOLVABLE, (), reason, counts, total)
-    plan: Sequence[int] = path_to(order.reached, order.best)
+    flat = Search(task, deadline).go_on(most_work, limits.expansions)
+    if flat.status is not Status.SOLVED or not flat.plan:
+        return flat
     if found:
-        found(plan)
+        found(flat.plan)
     with suppress(MemoryError):  # otherwise the plan isn't shortened
-        plan = shorter(task, plan, SHORTEN + STEP * min(len(plan), STEPS) + total // SHORTENING, deadline)
-    return Flat(Status.SOLVED, tuple(plan), None, counts, total)
+        work = SHORTEN + STEP * min(len(flat.plan), STEPS) + flat.work // SHORTENING
+        return replace(flat, plan=tuple(shorter(task, flat.plan, work, deadline)))
+    return flat
+
+
+class Search:
+    """A search for a plan of a grounded task that can be interrupted and resumed; its two search orders take turns."""
+
+    def __init__(self, task: Task, deadline: float | None = None, counts: Counts | None = None) -> None:
+        self.task, self.deadline, self.work = task, deadline, 0
+        self.counts = Counts() if counts is None else counts
+        self._turns = self._explored(task)
+        self._result: Flat | None = None
+
+    def go_on(self, most_work: float = math.inf, expansions: float = math.inf) -> Flat:
+        """Search until there is a result, or until a limit of the work or of the expansions of the whole search is reached."""
+        while self._result is None:
+            if self.work >= most_work:
+                return self._ended(Status.GAVE_UP, "the limit of work came first")
+            if self.counts.expanded >= expansions:
+                return self._ended(Status.GAVE_UP, f"the limit of {expansions} expansions came first")
+            if self.deadline is not None and perf_counter() > self.deadline:
+                return self._ended(Status.GAVE_UP, "the time limit came first")
+            try:
+                self.work += next(self._turns)
+            except StopIteration as end:
+                self._result = end.value
+            except OutOfTimeError:
+                self._result = self._ended(Status.GAVE_UP, "the time limit came first")
+        return self._result
+
+    def _ended(self, status: Status, why: str | None = None, plan: Sequence[int] = ()) -> Flat:
+        return Flat(status, tuple(plan), None if why is None else Reason(why), self.counts, self.work)
+
+    def _explored(self, task: Task) -> Generator[int, None, Flat]:
+        """Search; yield the work of each turn of a search order, and return the result."""
+        if task.initial & task.goal == task.goal:
+            return self._ended(Status.SOLVED)
+        evaluate = heuristic(task)
+        begun = evaluate(task.initial)
+        if begun is None:
+            return self._ended(Status.UNSOLVABLE, "the goal can't be reached even if nothing ever ceases to hold")
+        novelty = Novelty(task, evaluate, begun.work, landmarks(task, self.deadline), self.counts)
+        greedy = Greedy(task, evaluate, ahead(task, self.deadline), self.counts)
+        going: dict[SearchOrder, Iterator[int]] = {order: explore(task, order) for order in (novelty, greedy)}
+        spent: dict[SearchOrder, int] = dict.fromkeys(going, 0)
+        del novelty, greedy  # releases the memory of an order that runs out of memory
+        while True:
+            order = min(going, key=spent.__getitem__)
+            try:
+                work = next(going[order])
+                spent[order] += work
+                yield work
+            except MemoryError:
+                del going[order], spent[order]
+                if not going:
+                    return replace(self._ended(Status.GAVE_UP), reason=OUT_OF_MEMORY)
+            except StopIteration:
+                break
+        if order.best is None:
+            return self._ended(
+                Status.UNSOLVABLE, "all reachable states were searched, and none of them satisfies the goal"
+            )
+        return self._ended(Status.SOLVED, plan=path_to(order.reached, order.best))

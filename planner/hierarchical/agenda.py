@@ -29,7 +29,7 @@ from confab.planner.hierarchical.search_budget import (
     SearchBudget,
     scopes,
 )
-from confab.planner.hierarchical.unsolvability import Proofs, ignored
+from confab.planner.hierarchical.unsolvability import Proofs
 from confab.planner.plan import Plan
 from confab.planner.transitions import Cell, arguments_of
 from confab.reasoner.symbols import Condition
@@ -50,15 +50,15 @@ class Agenda:
     trial : bool
         Whether applied steps are final, and a failure proves nothing. Otherwise, the agenda may restart from the initial state, and
         attempts to prove that there is no plan.
-    found : function of a plan, optional
-        Function that is called with a cheapest plan of the lowest level if an attempt to prove that there is no plan finds one.
+    found : function, optional
+        Function that is called with a plan of the lowest level, found meanwhile (`Proofs.found`).
     """
 
     call: Call
     levels: tuple[int, ...] | None = None
     quickly: bool = False
     trial: bool = False
-    found: Callable[[Plan], None] = ignored
+    found: Callable[[Plan, bool], bool] | None = None
     _open: deque[Cell] = field(default_factory=deque)
     _asleep: dict[Cell, None] = field(default_factory=dict)
     _waiting: dict[Cell, list[Cell]] = field(default_factory=dict)

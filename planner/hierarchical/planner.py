@@ -29,14 +29,13 @@ from confab.planner.hierarchical.call import Call, Compiled, as_refined, compile
 from confab.planner.hierarchical.operators import quantified
 from confab.planner.hierarchical.scope import BITS
 from confab.planner.hierarchical.shortening import ORDERS, shortened
-from confab.planner.hierarchical.unsolvability import FINALLY, LOOKING, ignored
+from confab.planner.hierarchical.unsolvability import FINALLY, LOOKING, TURNS
 from confab.planner.hierarchical.windows import regroupings
 from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, UnsolvableError, paused_collection
 from confab.planner.plan_costs import cost_of
-from confab.planner.transitions import arguments_of
 from confab.planner.validation import validate
 from confab.reasoner.limits import LimitError, current, within
-from confab.reasoner.symbols import Problem, Symbol
+from confab.reasoner.symbols import Problem
 
 __all__ = ["ORDERS", "Call", "Compiled", "compiled", "plan"]
 
@@ -131,8 +130,8 @@ def _plan(
     call.accepts = limits.accepts or call.accepts
     advised(call)
     levels = call.program.levels if leave_levels else call.program.levels[:1]
-    cheapest = LowestLevelPlan(call)
-    agenda = Agenda(call, levels, found=cheapest.keep if leave_levels else ignored)
+    lowest = LowestLevelPlan(call)
+    agenda = Agenda(call, levels, found=lowest.keep if leave_levels else None)
     try:
         resumed = first is not None and call.resume(first)
         more = resumed and call.kept.keys() != call.goal.keys()
@@ -150,19 +149,22 @@ def _plan(
                 call.steps, call.bound, done = as_refined(call, flat.plan.steps), flat.bound, True
             elif not vast:
                 done = without_grounding(call, TRIALS // FIRST)
-        if done or agenda.achieve_all():
-            call.space.most_work, call.space.deadline = math.inf, before_the_check(call, until)
-            plan = shortened(call, improve, leave_levels, advised) if improve else call.tree()
-            if not leave_levels and any(step.level != levels[0] for step in plan.steps):
-                return given_up(
-                    call, f"a goal that level {levels[0]} doesn't see requires steps below it, and {NOT_LEFT}"
-                )
-            return call.outcome(Status.SOLVED, plan)
-        return cheapest.outcome() or last_resort(agenda, limits, leave_levels)
+        done = done or agenda.achieve_all()
+        why = "" if done else last_resort(agenda, limits, leave_levels, lowest)
     except UnsolvableError as proof:
         return replace(call.outcome(Status.UNSOLVABLE, reason=proof.reason), certificate=proof.certificate)
     except LimitError as limit:
-        return cheapest.outcome() or given_up(call, f"stopped at the limit: {limit}")
+        done, why = False, f"stopped at the limit: {limit}"
+    if not done and lowest.plan is None:
+        return given_up(call, why)
+    if not done:
+        lowest.replace_steps()
+    call.space.most_work, call.space.deadline = math.inf, before_the_check(call, until)
+    shorten = improve and (done or not lowest.cheapest)
+    plan = shortened(call, improve, leave_levels, advised) if shorten else call.tree()
+    if not leave_levels and any(step.level != levels[0] for step in plan.steps):
+        return given_up(call, f"a goal that level {levels[0]} doesn't see requires steps below it, and {NOT_LEFT}")
+    return call.outcome(Status.SOLVED, plan)
 
 
 def before_the_check(call: Call, until: float | None) -> float | None:
@@ -177,68 +179,64 @@ def before_the_check(call: Call, until: float | None) -> float | None:
 
 
 class LowestLevelPlan:
-    """A cheapest plan of the lowest level, found by the examination of its states during planning goal by goal."""
+    """A plan of the lowest level that is found during planning goal by goal."""
 
     def __init__(self, call: Call) -> None:
         self.call = call
         self.plan: Plan | None = None
+        self.cheapest = False
 
-    def keep(self, plan: Plan) -> None:
-        """Keep a plan, grouped under steps of the levels above, if it is a plan of the call's problem.
+    def keep(self, plan: Plan, cheapest: bool) -> bool:
+        """Keep a plan, grouped under steps of the levels above; return whether it is a plan of the call's problem.
 
-        Planning goal by goal ends at once if all steps have been grouped under single steps of the first level; otherwise it goes
-        on with as much work as it has done, and at least with the work `LOOKING`.
+        Planning goal by goal ends at once if the plan is a cheapest plan, and all its steps have been grouped under single steps of
+        the first level. Otherwise it goes on with as much work as it has done, and at least with the work `LOOKING`; with `TURNS`
+        times as much if the plan leaves a level.
 
         Raises
         ------
         LimitError
-            All steps have been grouped under single steps.
+            Planning goal by goal ends at once.
         """
         call, space = self.call, self.call.space
         plans = regroupings(call.problem, plan, call.program.levels[-1], call.using)
         self.plan = next((one for one in plans if not validate(call.problem, one)), None)
         if self.plan is None:
-            return
-        call.bound = cost_of(call.problem, self.plan)
-        space.most_work = min(space.most_work, space.worked + max(space.worked, LOOKING))
-        if all(step.level == call.program.levels[0] and not step.joined for step in self.plan.steps):
+            return False
+        self.cheapest = cheapest
+        stays = all(step.level == call.program.levels[0] for step in self.plan.steps)
+        space.most_work = min(space.most_work, space.worked + max(space.worked, LOOKING) * (1 if stays else TURNS))
+        if cheapest and stays and not any(step.joined for step in self.plan.steps):
             space.most_work = 0
             raise LimitError("a cheapest plan was found")
+        return True
 
-    def outcome(self) -> Outcome | None:
-        """Return the outcome of the call with the plan, or None without a plan."""
-        if self.plan is None:
-            return None
-        self.call.given_up.clear()
-        return self.call.outcome(Status.SOLVED, self.plan)
+    def replace_steps(self) -> None:
+        """Replace the steps of the call by the plan."""
+        call, (first, *lower) = self.call, self.call.program.levels
+        assert self.plan is not None
+        call.steps, call.given_up = as_refined(call, self.plan.steps), []
+        if self.cheapest:
+            call.bound = cost_of(call.problem, self.plan)
+        if any(step.level != first for step in self.plan.steps):
+            left, were = [first, *lower[:-1]], "were" if lower[1:] else "was"
+            call.given_up.append(
+                f"level{'s' * (len(left) > 1)} {', '.join(map(str, left))} {were} given up for the whole task"
+            )
 
 
-def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool) -> Outcome:
-    """Search the lowest level as a whole; give up if `leave_levels` is false, or if the level is too large."""
-    call, problem = agenda.call, agenda.call.problem
-    *upper, lowest = call.program.levels
-    agenda.proofs.certify(growth=FINALLY)
-    if upper and not leave_levels:
-        return given_up(call, f"no plan of level {upper[0]} was found that can be refined, and {NOT_LEFT}")
-    if upper:
-        call.given_up.append(
-            f"level{'s' * (len(upper) > 1)} {', '.join(map(str, upper))} "
-            f"{'were' if len(upper) > 1 else 'was'} given up for the whole task"
-        )
-    if agenda.proofs.too_large is None:
-        flat = lowest_alone(call, limits)
-    elif without_grounding(call, TRIALS):
-        flat = Outcome(Status.SOLVED, call.tree())
-    else:
-        why = f"planning goal by goal found no plan, and {agenda.proofs.too_large.text}"
-        flat = Outcome(Status.GAVE_UP, reason=Reason(why))
-    if flat.status is Status.GAVE_UP and flat.reason is not None:
-        return given_up(call, flat.reason.text)
-    plans = () if flat.plan is None else regroupings(problem, flat.plan, lowest, call.using)
-    plan = next((plan for plan in plans if plan is flat.plan or not validate(problem, plan)), None)
-    if plan and upper and all(step.level == upper[0] for step in plan.steps):
-        call.given_up.clear()  # all steps of the plan are of the first level, so no level was given up
-    return call.outcome(flat.status, plan, flat.reason)
+def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool, lowest: LowestLevelPlan) -> str:
+    """Search the lowest level as a whole, unless `leave_levels` is false; return the reason why no plan is found."""
+    call, proofs, (first, *lower) = agenda.call, agenda.proofs, agenda.call.program.levels
+    proofs.certify(growth=FINALLY)
+    if lower and not leave_levels:
+        return f"no plan of level {first} was found that can be refined, and {NOT_LEFT}"
+    reason = proofs.search(BITS * limits.work, call.space.counts[(first, *lower)[-1]].expanded + limits.expansions)
+    if proofs.too_large is None:
+        return reason.text
+    if without_grounding(call, TRIALS):
+        lowest.keep(call.tree(), False)
+    return f"planning goal by goal found no plan, and {proofs.too_large.text}"
 
 
 def is_vast(problem: Problem) -> bool:
@@ -278,28 +276,3 @@ def flat_first(problem: Problem, limits: Limits, deadline: float | None) -> Outc
     from confab.planner.grounded.best_first import plan_level
 
     return plan_level(problem, limits=limits.until(deadline), most_work=FLAT, most_rows=FLAT_ROWS)
-
-
-def lowest_alone(call: Call, limits: Limits) -> Outcome:
-    """Search the lowest level from the initial state.
-
-    If a changed symbol isn't at rest at the end of the plan, the plan is invalid. The search is then repeated with all rest values
-    as additional goals.
-    """
-    from confab.planner.grounded.best_first import plan_level
-
-    problem, deadline, lowest = call.problem, call.space.deadline, call.program.levels[-1]
-    call.table.undo(0)
-    restless = {cell: value for level in call.program.levels[1:] for cell, value in call.restless(level).items()}
-    rests = {Symbol(cell[0], arguments_of(cell[1])): value for cell, value in restless.items()}
-    goal = problem.goal_on(lowest)
-    for wanted in (goal, {**rests, **goal}):
-        flat = plan_level(problem, lowest, None, wanted, limits.until(deadline), BITS * limits.work)
-        call.count(flat)
-        if not rests or flat.plan is None or not validate(problem, flat.plan):
-            break
-    if wanted is not goal and flat.status is Status.UNSOLVABLE:  # a plan that changes fewer symbols may still exist
-        return replace(
-            flat, status=Status.GAVE_UP, reason=Reason("each plan that was found leaves a changed symbol not at rest")
-        )
-    return flat

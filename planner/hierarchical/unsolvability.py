@@ -1,26 +1,28 @@
-"""Tests for unsolvability, which run after failed searches, the cheapest test first.
+"""Tests for unsolvability and the search of the lowest level, which run after failed searches, the cheapest first.
 
 All tests examine only the lowest level. A failed search of an upper level proves nothing, because the level below may have other
-steps. The last test examines all states of the lowest level; it may find a cheapest plan instead. A successful test stops planning.
-`confab.planner.solve` requires a certificate for each proof, and checks the certificate.
+steps. The last test examines all states of the lowest level; it may find a cheapest plan instead. Finally, a search of the lowest
+level as a whole takes turns with planning goal by goal. A successful test stops planning. `confab.planner.solve` requires a
+certificate for each proof, and checks the certificate.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from time import perf_counter
 from typing import TYPE_CHECKING
 
 from confab.planner.hierarchical.call import Call
-from confab.planner.hierarchical.scope import LEAST
+from confab.planner.hierarchical.scope import BITS, LEAST
 from confab.planner.hierarchical.search_budget import WIDER
-from confab.planner.plan import OUT_OF_MEMORY, Plan, Reason, UngroundableError, UnsolvableError
+from confab.planner.plan import OUT_OF_MEMORY, Plan, Reason, Status, UngroundableError, UnsolvableError
 from confab.reasoner.limits import within
 from confab.reasoner.symbols import Fact, Problem, State
 
 if TYPE_CHECKING:
+    from confab.planner.grounded.best_first import Search
     from confab.planner.grounded.reachability import Reached
     from confab.planner.grounded.task import Task
 
@@ -39,29 +41,34 @@ REPEATED, FINALLY = 4, 2
 """Factors by which the limit of tests must have grown before a certificate is searched again: during planning, and at its end."""
 FEW = 1_000
 """The lowest level is examined when the searches have cost as much as examining this number of its states."""
+TURNS = 4
+"""The search of the lowest level as a whole has cost at most the effort of planning goal by goal, divided by this number."""
 MOST_ROWS, MOST_CHANGES = 2_000_000, 10_000_000
 """Maximum number of rows of a join of relaxed reachability (about 200 MB), and maximum number of changes of a grounded level
 (about 600 MB)."""
-
-
-def ignored(plan: Plan) -> None:
-    """Ignore a plan."""
 
 
 @dataclass
 class Proofs:
     """Attempts to prove that a call's problem has no plan; the attempts so far cost about as much as the searches so far.
 
-    If a proof isn't `wanted`, no attempt is made. `found` is called with the first plan that the examination of states finds; this
-    is a cheapest plan of the lowest level.
+    If a proof isn't `wanted`, no attempt is made. `found` is called with a plan of the lowest level, and with whether no plan is
+    cheaper; it returns whether this is a plan of the call's problem. Then no further plan is searched. Without `found`, the
+    lowest level isn't searched.
     """
 
     call: Call
     wanted: bool = True
-    found: Callable[[Plan], None] = ignored
+    found: Callable[[Plan, bool], bool] | None = None
     _lowest: Task | Reason | None = None
     _tests: int = 1
     _states: float = 0
+    _search: Search | None = None
+    _solved: bool = False
+
+    def __post_init__(self) -> None:
+        """Begin with the lowest level and its own goals."""
+        self._tasks = self.tasks()
 
     @property
     def too_large(self) -> Reason | None:
@@ -100,21 +107,65 @@ class Proofs:
         The exhaustive search is repeated each time that the work of the searches suffices for twice as many states, until it finds
         a plan.
         """
-        space, program = self.call.space, self.call.program
+        space = self.call.space
         if not self._may_succeed():
             return
-        if self._lowest is None:
-            self._lowest = proved(self.call.problem, program.levels[-1], space.deadline)
-        if isinstance(self._lowest, Reason):
+        lowest = self.lowest()
+        if isinstance(lowest, Reason) or self._solved:
             return
-        states = max(LOOKING, EASIER * space.worked) // max(len(self._lowest.owners), LEAST)
+        states = max(LOOKING, EASIER * space.worked) // max(len(lowest.owners), LEAST)
         if states >= 2 * self._states:
             self._states = states
-            if isinstance(result := exhausted(self._lowest, states, space.deadline), Reason):
+            if isinstance(result := exhausted(lowest, states, space.deadline), Reason):
                 raise UnsolvableError(result)
             if result is not None:
                 self._states = math.inf
-                self.found(result)
+                self._solved = self.found is None or self.found(result, True)
+        self.search(BITS * space.effort // TURNS)
+
+    def search(self, most_work: float, expansions: float = math.inf) -> Reason:
+        """Search the lowest level as a whole until this has cost `most_work`, or until a number of expansions on the level.
+
+        Pass each plan to `found`. Raise `UnsolvableError` if there is a proof; otherwise return why the search ends.
+        """
+        from confab.planner.grounded.best_first import Search
+
+        space = self.call.space
+        while self.found is not None and not self._solved:
+            if self._search is None:
+                task = next(self._tasks, None)
+                if task is None:
+                    return self.too_large or Reason("each plan that was found leaves a changed symbol not at rest")
+                self._search = Search(task, space.deadline, space.counts[task.level])
+            flat, task = self._search.go_on(most_work, expansions), self._search.task
+            if flat.status is Status.GAVE_UP and flat.reason is not None:
+                return flat.reason
+            if flat.status is Status.UNSOLVABLE and flat.reason is not None and task is self._lowest:
+                raise UnsolvableError(flat.reason)
+            self._search = None
+            self._solved = flat.status is Status.SOLVED and self.found(Plan(task.steps(flat.plan)), False)
+        return Reason("a plan was found")
+
+    def lowest(self) -> Task | Reason:
+        """Return the grounded lowest level, or the reason why it can't be grounded."""
+        if self._lowest is None:
+            self._lowest = proved(self.call.problem, self.call.program.levels[-1], self.call.space.deadline)
+        return self._lowest
+
+    def tasks(self) -> Iterator[Task]:
+        """Yield the grounded lowest level, and then the level with more goals: the rest values that don't hold initially."""
+        from confab.planner.grounded.grounding import ground
+
+        lowest, problem = self.lowest(), self.call.problem
+        if isinstance(lowest, Reason):
+            return
+        yield lowest
+        level = lowest.level
+        rests = {symbol: problem.domain.situations[symbol.situation].rest for symbol in problem.initial}
+        goal = problem.goal_on(level)
+        more = {s: rest for s, rest in rests.items() if rest and s not in goal and problem.first_level(s) <= level}
+        if more and not isinstance(task := ground(problem, level, goal={**goal, **more}), Reason):
+            yield task
 
     def _may_succeed(self) -> bool:
         """Return whether a proof is wanted, and no advice promises a plan after little work."""

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from confab.planner.grounded import reachability
-from confab.planner.grounded.best_first import plan_level, search
+from confab.planner.grounded.best_first import Search, plan_level, search
 from confab.planner.grounded.exploring import SearchOrder, explore, path_to
 from confab.planner.grounded.greedy import Greedy
 from confab.planner.grounded.grounding import ground
@@ -47,6 +47,18 @@ def test_every_level_of_the_tabletop_is_planned_flat(tabletop: Problem, level: i
     outcome = plan_level(tabletop, level)
     assert outcome.status is Status.SOLVED and outcome.plan is not None
     assert validate(tabletop, outcome.plan) == []
+
+
+@pytest.mark.parametrize("level", [1, 2, 3])
+def test_a_search_that_is_interrupted_again_and_again_finds_the_same_plan(tabletop: Problem, level: int) -> None:
+    task = ground(tabletop, level)
+    assert isinstance(task, Task)
+    whole, parts = Search(task).go_on(), Search(task)
+    stops = 0
+    while (part := parts.go_on(parts.work + 1)).status is Status.GAVE_UP:
+        stops += 1
+    assert stops > 1
+    assert whole.plan and (part.plan, part.work, part.counts) == (whole.plan, whole.work, whole.counts)
 
 
 def without_reach(problem: Problem, place: str) -> Problem:

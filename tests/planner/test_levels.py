@@ -197,6 +197,25 @@ def test_the_number_of_examined_states_grows_with_the_work_of_the_searches() -> 
         proofs.examine()
 
 
+def test_a_plan_of_the_lowest_level_is_found_while_planning_goal_by_goal_goes_on() -> None:
+    problem, found = tabletop(), list[tuple[Plan, bool]]()
+
+    def keep(plan: Plan, cheapest: bool) -> bool:
+        found.append((plan, cheapest))
+        return True
+
+    proofs = Proofs(Call(problem, compiled(problem), None, 1), found=keep)
+    works = 0
+    while not found:
+        proofs.examine()
+        works += 1
+        proofs.call.space.worked = 2 * proofs.call.space.worked + 1
+    proofs.examine()  # finds no further plan
+    ((plan, _),) = found
+    assert works > 1
+    assert validate(problem, plan) == []
+
+
 def test_a_shorter_order_of_goals_also_achieves_the_goals_that_level_1_does_not_see() -> None:
     problem = hierarchy(4_000_382)  # level 1 doesn't see the goal position of the robot
     outcome = default(problem)
