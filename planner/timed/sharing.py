@@ -369,21 +369,22 @@ class _SharingSearch:
         an early task.
         """
         tasks = list(now.tasks)
-        i, step, actors, above = random.choice(now.critical)
+        late = now.cost[0] and random.random() < HALF
+        i, step, actors, above = now.critical[0] if late else random.choice(now.critical)
         if now.cost[0] and random.random() < EARLY:
             if isinstance(tasks[i][0], Symbol):
                 tasks.insert(random.randrange(i + 1), (above, Crew()))
             else:
                 del tasks[i]
             return tasks
-        i = i if random.random() < PREFERRED else random.randrange(len(tasks))
+        at, i = i, i if random.random() < PREFERRED else random.randrange(len(tasks))
         j, kind = random.randrange(len(tasks)), random.randrange(4)
         goal, crew = tasks[i]
         if kind == 0 and len(self.crews) > 1:
             tasks[i] = goal, random.choice([one for one in self.crews if one != crew])
         elif kind == 1 and crew != tasks[j][1]:
             tasks[i], tasks[j] = (goal, tasks[j][1]), (tasks[j][0], crew)
-        elif kind == 2 and len(self.compiled) < MOST_COMPILED:
+        elif kind == 2 and i == at and len(self.compiled) < MOST_COMPILED:
             if actors and random.random() < HALF:
                 tasks[i] = goal, replace(crew, chosen=(), without=crew.without.union(actors[:1]))
             else:

@@ -40,6 +40,7 @@ from confab.timing import headline, scheduled
 from worlds.deliveries import deliveries
 from worlds.families import family, table
 from worlds.timed import Action, TimedWorld, least_makespan, problem_of, rejected, timed_world
+from worlds.writing import becomes, behavior, has, world
 
 
 @cache
@@ -208,6 +209,42 @@ def test_of_two_late_schedules_the_reason_names_the_times_of_the_less_late(monke
     told = [Timed(reason=Reason(f"late by {late} s"), late=Fraction(late)) for late in (11, 1)]
     monkeypatch.setattr("confab.planner.timed.call.in_time", lambda *_: told.pop(0))
     assert best_in_time(serving(), found).reason == Reason("late by 1 s")
+
+
+def test_steps_with_an_individual_whose_window_ends_take_another_individual() -> None:
+    """Four loaves are baked at the night tariff until its window ends, and then at the day tariff."""
+    loaves = tuple(f"loaf{i}" for i in range(4))
+
+    def step(name: str, terms: str, before: str, after: str, seconds: int) -> Behavior:
+        asked, made = [has("STAGE", "?l", before)], [becomes("STAGE", "?l", after)]
+        spans = tuple((Span.THROUGHOUT, one) for one in asked), tuple((Span.THROUGHOUT, one) for one in made)
+        timing = Timing(Fraction(seconds), (terms.split(":")[0],), *spans)
+        return replace(behavior(name, 2, terms, asked, made), timing=timing)
+
+    bakery = world(
+        [SituationType("STAGE", ("Loaf",), "STAGE")],
+        [
+            behavior("MAKE", 1, "?l:Loaf", [has("STAGE", "?l", "raw")], [becomes("STAGE", "?l", "baked")]),
+            step("KNEAD", "?m:Mixer ?l:Loaf", "raw", "mixed", 600),
+            step("REST", "?l:Loaf", "mixed", "rested", 1800),
+            step("BAKE", "?o:Oven ?l:Loaf ?t:Tariff", "rested", "baked", 1800),
+        ],
+        {
+            "Loaf": loaves,
+            "Mixer": ("mixer",),
+            "Oven": ("oven",),
+            "Tariff": ("night", "day"),
+            "STAGE": ("raw", "mixed", "rested", "baked"),
+        },
+        {f"STAGE {loaf}": "raw" for loaf in loaves},
+        {f"STAGE {loaf}": "baked" for loaf in loaves},
+        value_levels={"mixed": 2, "rested": 2, "mixer": 2, "oven": 2, "day": 2, "night": 2},
+    )
+    change = Fraction(5400)
+    windows = {"night": ((Fraction(0), change),), "day": ((change, None),)}
+    _, timed = planned(replace(bakery, times=Times(windows=windows)))
+    assert timed is not None
+    assert timed.plan is not None
 
 
 def planned(problem: Problem) -> tuple[Outcome, Timed | None]:
