@@ -314,16 +314,21 @@ class _Finder:
     def without_durations(self, limits: Limits) -> Iterator[list[int]]:
         """Yield sequences of operators from searches that ignore durations. No step is running at the end of a sequence.
 
-        The first search uses only the longest of several steps that differ only in their durations.
+        The first search uses only the longest of several steps that differ only in their durations. If a step that is
+        running in the end can't end, a search with the goal that no step is running follows.
         """
-        running = self.marks | sum(1 << bit for bit, fact in self.task.complements.items() if _runs(fact))
-        shorter = dominated(self.task, self.ends, self.lasts, running)
+        idle = sum(1 << bit for bit, fact in self.task.complements.items() if _runs(fact))
+        shorter = dominated(self.task, self.ends, self.lasts, self.marks | idle)
         for never in (shorter, set[int]()) if shorter else (shorter,):
-            task = excluding(self.task, never | self.oversized, running)
-            first = search(task, limits, limits.end(FIRST))
-            self.counts.add(first.counts)
-            if first.status is Status.SOLVED and (whole := self.completed(list(first.plan))) is not None:
-                yield whole
+            task = excluding(self.task, never | self.oversized, self.marks | idle)
+            for one in (task, replace(task, goal=task.goal | idle)):
+                first = search(one, limits, limits.end(FIRST))
+                self.counts.add(first.counts)
+                whole = self.completed(list(first.plan)) if first.status is Status.SOLVED else None
+                if whole is not None:
+                    yield whole
+                if whole is not None or first.status is not Status.SOLVED:
+                    break
 
     def ending(self, operator: int) -> int | None:
         """Return the operator that ends the step begun by the given operator, or None if the step can't end."""

@@ -254,6 +254,17 @@ def test_what_a_step_takes_again_before_its_end_isnt_given() -> None:
         assert solve(Request(spanned(level, asked, made, "G"), limits=Limits(seconds=10.0))).plan is None
 
 
+def test_a_goal_isnt_reached_by_a_step_that_never_ends() -> None:
+    """The first step gives the goal at its begin, but its end needs what only the second step has meanwhile."""
+    never = Action(4, None, (("end", (1, True)),), (("end", (2, True)), ("start", (0, True)), ("end", (0, False))))
+    gives = Action(1, None, (), (("throughout", (0, True)), ("start", (1, True)), ("end", (1, False))))
+    undoes = Action(2, 0, (), (("end", (0, False)), ("end", (1, False))))
+    problem = problem_of(TimedWorld(3, (undoes, gives, never), frozenset({2}), ((0, True),)))
+    timed = schedule_of(solve(Request(problem, limits=Limits(seconds=20.0))))
+    assert timed is not None
+    assert timed.makespan == 1
+
+
 def test_validation_accepts_a_step_that_gives_itself_what_it_needs(tmp_path: Path) -> None:
     text = JARS.replace("c:postcondition :PRESS.tight", "c:postcondition :PRESS.done, :PRESS.tight").replace(
         ":SCREW a",
