@@ -6,7 +6,6 @@ Therefore a thousand free places count as one place.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
-from heapq import nsmallest
 from itertools import islice
 
 from confab.planner.hierarchical.operators import FEW, Program
@@ -56,7 +55,7 @@ class Candidates:
                 self.table.holders[situation],
             )
 
-            found = representatives(groups, holders, wanted, self._cursors, lambda value: self.burden(situation, value))
+            found = representatives(groups, holders, wanted, self._cursors)
             self._free[situation, kind] = found
         goal = self.goal.get((situation, key))
         if goal is not None and goal not in found and goal in self.program.members[kind]:
@@ -86,20 +85,11 @@ class Candidates:
         return found
 
     def spare(self, excluded: Collection[str], level: int, number: int) -> Iterator[str]:
-        """Yield up to `number` additional values of each symmetry class with a member in `excluded`.
-
-        Values with the least burden come first.
-        """
+        """Yield up to `number` additional values of each symmetry class with a member in `excluded`."""
         for situation in self.program.changing(level):
             members = self.program.problem.classes.get(situation.range, ())
             if len(members) <= FEW:
                 continue
             for group in self.program.symmetry.groups(members):
                 if not set(group).isdisjoint(excluded):
-                    others = (value for value in group if value not in excluded)
-                    yield from nsmallest(number, others, key=lambda value: self.burden(situation.name, value))
-
-    def burden(self, situation: str, value: str) -> int:
-        """Return 0 for a value that no object has, 2 if an object with the value is at its goal, and 1 otherwise."""
-        keys = self.table.holders[situation].get(value, ())
-        return 1 + any(self.goal.get((situation, key)) == value for key in keys) if keys else 0
+                    yield from islice((value for value in group if value not in excluded), number)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain
 
 from confab.planner.transitions import Key
@@ -97,11 +97,10 @@ def representatives(
     holders: Mapping[str, Mapping[Key, None]],
     wanted: Mapping[str, object],
     cursors: dict[int, int] | None = None,
-    burden: Callable[[str], int] = lambda value: 0,
 ) -> list[str]:
     """Return one value for each group: the first value that no object has and no goal requires.
 
-    For a group without such a value, return a few values that no object has, or otherwise the value with the least `burden`.
+    For a group without such a value, return a few values that no object has, or otherwise the first value.
     `cursors` contains the position of the last result in each group, by the group's `id`. The next search in the group starts at
     this position.
 
@@ -120,5 +119,5 @@ def representatives(
                 break
         else:
             free = [value for value in group if not holders.get(value)][:4]
-            found.extend(free or [min(group, key=burden)])
+            found.extend(free or group[:1])
     return found
