@@ -12,7 +12,7 @@ from itertools import product
 from math import prod
 from typing import TypeAlias
 
-from confab.planner.generated import CodeBlock, identifier, tuple_written, written
+from confab.planner.generated import GeneratorFunction, identifier, tuple_written, written
 from confab.planner.transitions import PythonWriter, Table
 from confab.reasoner.language import is_variable, mentions, needs
 from confab.reasoner.limits import check
@@ -26,8 +26,6 @@ from confab.reasoner.symbols import (
     Witness,
 )
 
-MOST_LOOPS = 15
-"""Maximum number of loops in one function; Python nests at most 20 loops."""
 MOST_COMBINED = 16
 """Maximum number of combinations of alternatives of a behaviour that are joined separately."""
 Join: TypeAlias = "Callable[[], Iterator[tuple[str, ...]]]"
@@ -78,15 +76,11 @@ def _alternatives(conditions: Sequence[Condition]) -> Iterable[Sequence[Conditio
 def _joined(
     writer: PythonWriter, name: str, behavior: Behavior, conditions: Sequence[Condition], sizes: Sizes
 ) -> Iterator[str]:
-    """Yield the lines of functions that yield the arguments with which conditions may hold.
-
-    Each source of candidates has a loop. After `MOST_LOOPS` loops, a function calls the next function.
-    """
-    kinds, loops, block = behavior.kinds, 0, CodeBlock()
+    """Yield the lines of functions that yield the arguments with which conditions may hold, with a loop for each source."""
+    kinds, block = behavior.kinds, GeneratorFunction(name)
     waiting, bound, tests = list(conditions), set[str](), list[str]()
     parameters = [p.name for p in behavior.parameters]
     look = writer.constant(("look", "time"), partial(check, "looking for applicable behaviours"))
-    block.open(f"def {name}():")
     while True:
         slow = False
         while ready := next((c for c in waiting if _open_terms(c, kinds) <= bound), None):
@@ -102,15 +96,8 @@ def _joined(
             yield from block.lines
             return
         block.add(f"{look}()")
-        if loops == MOST_LOOPS:
-            name, given = f"{name}_more", ", ".join(map(written, sorted(bound)))
-            block.add(f"yield from {name}({given})")
-            yield from block.lines
-            loops, block = 0, CodeBlock()
-            block.open(f"def {name}({given}):")
         loop, terms = _loop(writer, behavior, waiting, bound, sizes)
-        loops += 1
-        block.open(loop)
+        block.loop(loop, [written(term) for term in sorted(bound)])
         tests = [f"{written(term)} == {source}" for term, source in terms if term in bound or not is_variable(term)]
         fresh = {term: source for term, source in reversed(terms) if is_variable(term) and term not in bound}
         for term, source in fresh.items():

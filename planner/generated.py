@@ -32,12 +32,23 @@ def key_written(arguments: Sequence[str]) -> str:
     return written(arguments[0]) if len(arguments) == 1 else tuple_written(map(written, arguments))
 
 
-class CodeBlock:
-    """Lines of Python code; each opened line indents the lines that follow."""
+MOST_LOOPS = 15
+"""Maximum number of nested loops in one function; Python nests at most 20 loops."""
 
-    def __init__(self) -> None:
+
+class GeneratorFunction:
+    """Lines of Python code that define a generator function; each opened line indents the lines that follow.
+
+    After `MOST_LOOPS` nested loops, the function calls another function, which has the lines that follow.
+    """
+
+    def __init__(self, name: str, parameters: Iterable[str] = ()) -> None:
         self.lines: list[str] = []
-        self._depth = 0
+        self._begin(name, parameters)
+
+    def _begin(self, name: str, parameters: Iterable[str]) -> None:
+        self._name, self._depth, self._loops = name, 0, 0
+        self.open(f"def {name}({', '.join(parameters)}):")
 
     def add(self, line: str) -> None:
         """Add a line."""
@@ -47,6 +58,15 @@ class CodeBlock:
         """Add a line, and indent the lines that follow."""
         self.add(line)
         self._depth += 1
+
+    def loop(self, line: str, names: Sequence[str]) -> None:
+        """Open a loop; `names` are the names that the lines in the loop may use."""
+        if self._loops == MOST_LOOPS:
+            further = f"{self._name}_more"
+            self.add(f"yield from {further}({', '.join(names)})")
+            self._begin(further, names)
+        self.open(line)
+        self._loops += 1
 
 
 @lru_cache(maxsize=256)

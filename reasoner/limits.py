@@ -118,6 +118,16 @@ def checked(rows: Iterable[T], doing: str) -> Iterator[T]:
         yield row
 
 
+MOST_LISTED = 5_000_000
+"""Maximum number of items in one list; a million items take about 200 MB."""
+
+
+def check_listed(count: int, items: str) -> None:
+    """Raise `LimitError` if there are too many items for a list; `items` is their name."""
+    if count > MOST_LISTED:
+        raise LimitError(f"{count} {items} can't be listed, since more than {MOST_LISTED} need too much memory")
+
+
 def check(doing: str, ahead: float = 0.0) -> None:
     """Raise `OutOfTimeError` if the current deadline has passed or is less than `ahead` seconds away."""
     _current.get().check(doing, ahead)

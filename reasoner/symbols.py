@@ -677,6 +677,13 @@ class Problem:
             rank = rank * len(ranks) + ranks[argument]
         return number + rank
 
+    def quantified(self, level: int) -> int:
+        """Return the number of quantified behaviours of a level."""
+        return sum(
+            prod(len(self.classes.get(parameter.kind, ())) for parameter in behavior.parameters)
+            for behavior in self.domain.at_level(level)
+        )
+
     @cached_property
     def _numbers(self) -> Mapping[str, tuple[int, tuple[str, ...]]]:
         """The first ID of each behaviour, and the classes of its parameters."""

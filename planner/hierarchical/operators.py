@@ -16,12 +16,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from functools import cached_property
-from math import prod
 from typing import TypeAlias, TypeGuard
 
 from confab.planner.amount_transitions import approaches_goal
 from confab.planner.derived_facts import CompiledRules
-from confab.planner.generated import CodeBlock, identifier, tuple_written, written
+from confab.planner.generated import GeneratorFunction, identifier, tuple_written, written
 from confab.planner.hierarchical.symmetry import SymmetryClasses, representatives
 from confab.planner.transitions import Forward, Key, PythonWriter, Table, in_binding_order
 from confab.reasoner.amounts import Amount, inside, terms_of
@@ -141,7 +140,7 @@ class Program:
 
     def size(self, level: int) -> int:
         """Return an upper bound on the number of quantified behaviours of a level."""
-        return quantified(self.problem, level)
+        return self.problem.quantified(level)
 
     def changing(self, level: int) -> list[SituationType]:
         """Return the situation types that effects of a level change, except boolean situation types."""
@@ -175,7 +174,7 @@ class Program:
         name = f"{identifier('achieve', behavior.name)}_{number}"
         inputs = [f"i{i}" for i in range(len(effect.arguments) + 1)]
         waiting = [*effect.when, *behavior.preconditions, *allowed(behavior, self.domain.situations)]
-        block = CodeBlock()
+        block = GeneratorFunction(name, inputs)
         bound = self._enumerated(behavior, effect, inputs, waiting, block)
         block.add("unmet = ()")
         soft, determined = self._tested(behavior, waiting, bound, block)
@@ -184,14 +183,18 @@ class Program:
         names = ", ".join(f"{term!r}: {written(term)}" for term in sorted(bound))
         arguments = tuple_written(written(p.name) for p in behavior.parameters)
         block.add(f"yield {arguments}, unmet, {{{names}}} if unmet else None")
-        yield f"def {name}({', '.join(inputs)}):"
-        yield from ("    " + line for line in block.lines)
+        yield from block.lines
         yield f"achieve[{behavior.name!r}, {number}] = {name}"
         achiever = Achiever(behavior.name, number, tuple(soft), determined, behavior.kinds)
         self.achievers.setdefault((behavior.level, effect.situation), []).append(achiever)
 
     def _enumerated(
-        self, behavior: Behavior, effect: AnyEffect, inputs: Sequence[str], waiting: list[Condition], block: CodeBlock
+        self,
+        behavior: Behavior,
+        effect: AnyEffect,
+        inputs: Sequence[str],
+        waiting: list[Condition],
+        block: GeneratorFunction,
     ) -> set[str]:
         """Write loops over the candidates of unbound parameters, with tests on bound terms; return the bound terms.
 
@@ -220,13 +223,13 @@ class Program:
             if generator is None:
                 return bound
             term, candidates = generator
-            block.open(f"for {written(term)} in {candidates}:")
+            block.loop(f"for {written(term)} in {candidates}:", [*inputs, *map(written, sorted(bound))])
             bound.add(term)
             free = [one for one in free if one != term]
             tests = [self.writer.member(term, behavior.kinds[term])]
 
     def _tested(
-        self, behavior: Behavior, waiting: Sequence[Condition], bound: set[str], block: CodeBlock
+        self, behavior: Behavior, waiting: Sequence[Condition], bound: set[str], block: GeneratorFunction
     ) -> tuple[list[Condition], Determined]:
         """Write tests that add the unmet conditions to `unmet`; bind the variables that the state determines.
 
@@ -345,14 +348,6 @@ class Program:
                 kind = self.problem.members(condition.kind)
                 found = found - kind if condition.negated else found & kind
         return found
-
-
-def quantified(problem: Problem, level: int) -> int:
-    """Return an upper bound on the number of quantified behaviours of a level."""
-    return sum(
-        prod(len(problem.classes.get(parameter.kind, ())) for parameter in behavior.parameters)
-        for behavior in problem.domain.at_level(level)
-    )
 
 
 def named(problem: Problem, rests: bool = True) -> list[str]:

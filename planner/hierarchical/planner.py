@@ -23,10 +23,8 @@ from contextlib import suppress
 from dataclasses import replace
 from time import perf_counter
 
-from confab.planner.applicable import MOST_LOOPS
 from confab.planner.hierarchical.agenda import Agenda
 from confab.planner.hierarchical.call import Call, Compiled, as_refined, compiled
-from confab.planner.hierarchical.operators import quantified
 from confab.planner.hierarchical.scope import BITS
 from confab.planner.hierarchical.shortening import ORDERS, shortened
 from confab.planner.hierarchical.unsolvability import FINALLY, LOOKING, TURNS
@@ -240,10 +238,9 @@ def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool, lowest: Lowe
 
 
 def is_vast(problem: Problem) -> bool:
-    """Return whether a task of one level has too many quantified behaviours to be grounded first, and can be compiled."""
+    """Return whether a task of one level has too many quantified behaviours to be grounded first."""
     (level,) = problem.domain.levels
-    compiles = all(len(behavior.kinds) <= MOST_LOOPS for behavior in problem.domain.at_level(level))
-    return compiles and quantified(problem, level) > VAST
+    return problem.quantified(level) > VAST
 
 
 def without_grounding(call: Call, trials: int) -> bool:

@@ -9,6 +9,7 @@ from itertools import product
 from confab.planner.derived_facts import CompiledRules
 from confab.planner.transitions import Forward, PythonWriter, Table, key_of
 from confab.reasoner.amounts import Number
+from confab.reasoner.limits import check_listed, checked
 from confab.reasoner.symbols import FALSE, GroundBehavior, Problem, State, Symbol
 
 Values = tuple[str, ...]
@@ -110,10 +111,18 @@ def _symbols(problem: Problem) -> tuple[Symbol, ...]:
 
 
 def ground(problem: Problem, level: int) -> tuple[GroundBehavior, ...]:
-    """Return all quantified behaviours of a level in the order of their IDs, as the SPARQL queries of quantification do."""
+    """Return all quantified behaviours of a level in the order of their IDs, as the SPARQL queries of quantification do.
+
+    Raises
+    ------
+    LimitError
+        The deadline has passed, or the level has too many quantified behaviours for a list.
+    """
+    check_listed(problem.quantified(level), f"quantified behaviours of level {level}")
     number = problem.domain.first_ids.get(level, 0)
     found: list[GroundBehavior] = []
     for behavior in problem.domain.at_level(level):
-        for arguments in product(*(problem.classes.get(parameter.kind, ()) for parameter in behavior.parameters)):
+        every = product(*(problem.classes.get(parameter.kind, ()) for parameter in behavior.parameters))
+        for arguments in checked(every, f"quantifying {behavior.name}"):
             found.append(GroundBehavior(number + len(found), behavior.name, arguments))
     return tuple(found)

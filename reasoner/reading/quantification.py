@@ -12,7 +12,7 @@ from __future__ import annotations
 import pyoxigraph as ox
 
 from confab.reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
-from confab.reasoner.limits import checked
+from confab.reasoner.limits import check_listed, checked
 from confab.reasoner.names import nearest
 from confab.reasoner.reading.problem import Reading
 from confab.reasoner.reading.rows import FIRST_INDEX_OF_NONE
@@ -34,6 +34,7 @@ def quantify(graph: KnowledgeGraph, reading: Reading, level: int) -> tuple[Groun
     2 B2_PICK left_hand cup1
     """
     problem = reading.problem
+    check_listed(problem.quantified(level), f"quantified behaviours of level {level}")
     found: dict[int, GroundBehavior] = {}
     for behavior in problem.domain.at_level(level):
         kinds = [parameter.kind for parameter in behavior.parameters]

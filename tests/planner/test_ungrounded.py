@@ -11,7 +11,8 @@ import pytest
 from confab.planner.hierarchical import planner
 from confab.planner.hierarchical.call import Call, compiled
 from confab.planner.hierarchical.ungrounded import UngroundedSearch
-from confab.planner.solve import Request, solve
+from confab.planner.plan import Limits
+from confab.planner.solve import Mode, Request, solve
 from confab.planner.validation import validate
 from confab.reasoner.limits import LimitError
 from confab.reasoner.pddl.importing import imported
@@ -145,13 +146,19 @@ def test_a_plan_that_is_found_counts_against_the_budget_and_is_kept() -> None:
     assert UngroundedSearch(call, 10**6).plan() is None and call.space.expanded <= 5
 
 
-def test_a_behaviour_with_many_parameters_is_planned() -> None:
+@pytest.mark.parametrize("mode", ["guarded", "optimal"])
+@pytest.mark.parametrize(
+    "static", ["", "(:action undo :parameters (?a ?b) :precondition (p ?a ?b) :effect (not (p ?a ?b)))"]
+)
+def test_a_behaviour_with_many_parameters_is_planned(mode: Mode, static: str) -> None:
     """Python can't nest a loop for each of them."""
     many = [f"?x{i}" for i in range(24)]
     domain = f"""(define (domain many) (:requirements :strips) (:predicates (p ?a ?b) (done))
       (:action do :parameters ({" ".join(many)}) :precondition (and {" ".join(f"(p {a} {b})" for a, b in pairwise(many))})
-        :effect (done)))"""
+        :effect (done)) {static})"""
     text = "(define (problem p) (:domain many) (:objects a b c) (:init (p a b) (p b a)) (:goal (done)))"
     problem = imported(parse(domain, text)).problem
-    outcome = solve(Request(problem))
+    outcome = solve(Request(problem, mode, Limits(seconds=20.0)))
     assert outcome.plan is not None and len(outcome.plan.primitives) == 1
+    with pytest.raises(LimitError, match=r"2824295364\d\d quantified behaviours of level 1"):
+        solve(Request(problem, "paper"))
