@@ -17,7 +17,7 @@ abstract step are a subtree.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
@@ -140,15 +140,16 @@ class _TreeBuilder:
         self.problem = problem
         primitives = plan.primitives
         self.purposes: Mapping[Path, Purpose] = purposes(problem, Plan(primitives))
-        self.needs: dict[Path, list[Need]] = {}
-        for step in reversed(primitives):  # a primitive required only by superfluous steps is superfluous
-            needs = self.purposes[step.path].needs
-            self.needs[step.path] = [need for need in needs if not need.by or self.needs.get(need.by)]
         self.position = {step.path: number for number, step in enumerate(primitives)}
-        self.changed: dict[Symbol, list[int]] = {}
+        self.changed: dict[Symbol, dict[int, str]] = {}
         for path, number in self.position.items():
             for change in self.purposes[path].gives:
-                self.changed.setdefault(change.fact.symbol, []).append(number)
+                self.changed.setdefault(change.fact.symbol, {})[number] = change.fact.value
+        self.needs: dict[Path, list[Need]] = {}
+        for step in reversed(primitives):  # a primitive required only by superfluous steps is superfluous
+            needs = [need for need in self.purposes[step.path].needs if not need.by or self.needs.get(need.by)]
+            self.needs[step.path] = [need for need in needs if self.lasts(step.path, need)] or needs
+        self.regained = set(self.already_satisfied())
         self.order: PartialOrder = partial_order(problem, primitives)
         self.workers = workers_of(problem)
 
@@ -239,6 +240,7 @@ class _TreeBuilder:
         """Return the condition that the facts of a causal link, or the conditions of the later step, hold.
 
         If a step between the two steps changes a symbol again, the symbol may have any value except the one from before the link.
+        Conditions that hold before the earlier step aren't enough, since the plan violates them in the meantime.
         """
         between = range(self.position[path] + 1, self.position.get(need.by, len(self.position)))
         facts, conditions = list[Fact](), list[Condition]()
@@ -249,9 +251,34 @@ class _TreeBuilder:
             else:
                 facts.append(self.wanted(change, need.kind))
         held = Holds(tuple(facts), tuple(conditions))
-        if need.conditions and not any(self.is_amount(change.fact.symbol) for change in need.gives):
+        amounts = any(self.is_amount(change.fact.symbol) for change in need.gives)
+        if need.conditions and not amounts and (path, need) not in self.regained:
             return First((held, Holds(conditions=need.conditions)))
         return held
+
+    def already_satisfied(self) -> Iterator[tuple[Path, Need]]:
+        """Yield each causal link whose conditions hold before the earlier step, with the path of this step."""
+        facts = LoggedState(self.problem, self.problem.initial)
+        for path in self.position:
+            for need in self.needs[path]:
+                if need.conditions and facts.rules.satisfied(need.conditions, {}, {}, facts) is not None:
+                    yield path, need
+            for change in self.purposes[path].gives:
+                facts.put(change.fact.symbol.situation, change.fact.symbol.arguments, change.fact.value)
+
+    def lasts(self, path: Path, need: Need) -> bool:
+        """Return whether all amounts of a causal link hold from the earlier step to the later one.
+
+        Otherwise a step between them changes an amount, and has a causal link to each of the two steps.
+        """
+        end = self.position.get(need.by, len(self.position))
+        return all(
+            meets(value, self.wanted(change, need.kind).value)
+            for change in need.gives
+            if self.is_amount(change.fact.symbol)
+            for number, value in self.changed[change.fact.symbol].items()
+            if self.position[path] <= number < end
+        )
 
     def is_amount(self, symbol: Symbol) -> bool:
         """Return whether the values of a symbol are numbers."""

@@ -16,6 +16,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum
 from fractions import Fraction
+from functools import partial
 from operator import itemgetter
 from typing import TypeVar
 
@@ -226,8 +227,9 @@ class _LevelExecution:
     ) -> Iterator[tuple[int, T]]:
         """Yield the steps without whose changes of some symbols a result would differ, with the result for these values.
 
-        The symbols that a step has written are tested one by one, and together if none of them matters alone. If the last change of
-        a symbol doesn't matter, the change before it is tested.
+        The symbols that a step has written are tested one by one, and together if none of them matters alone. The tests may read
+        further symbols of the step: those of another alternative. If the last change of a symbol doesn't matter, the change before
+        it is tested.
         """
         by: dict[int, dict[Cell, str]] = {}
         for cell in read:
@@ -236,11 +238,17 @@ class _LevelExecution:
         settled = set[Cell]()
         for writer, written in sorted(by.items(), reverse=True):
             without = {cell: before for cell, before in written.items() if cell not in settled}
-            found: dict[tuple[Cell, ...], T] = {
-                (cell,): one for cell, before in without.items() if (one := result({cell: before})) is not None
-            }
-            if not found and len(without) > 1 and (one := result(without)) is not None:
-                found = {(*without,): one}
+            found, further = dict[tuple[Cell, ...], T](), dict[Cell, None]()
+            groups: list[dict[Cell, str]] = [{cell: before} for cell, before in without.items()]
+            while groups:
+                for group in groups:
+                    one, cells = self.with_reads(partial(result, group))
+                    further |= cells
+                    if one is not None:
+                        found[tuple(group)] = one
+                more = {cell: self.written[cell][writer] for cell in further if writer in self.written[cell]}
+                wider = without | {cell: before for cell, before in more.items() if cell not in settled}
+                groups = [wider] if not found and len(wider) > max(1, *map(len, groups)) else []
             settled.update(cell for cells in found for cell in cells if not self.counted(cell))
             yield from ((writer, one) for one in found.values())
 

@@ -5,6 +5,7 @@ import random
 import re
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 
 import pytest
@@ -16,8 +17,24 @@ from confab.planner.acting.symbolic_world import SymbolicWorld
 from confab.planner.acting.world import WorldReport
 from confab.planner.behavior_tree import Situation
 from confab.planner.plan import Plan, Step
-from confab.planner.validation import open_goals
-from confab.reasoner.symbols import Problem, Symbol
+from confab.planner.validation import open_goals, validate
+from confab.reasoner.amounts import Amount, Quantity
+from confab.reasoner.symbols import (
+    FALSE,
+    TRUE,
+    AmountEffect,
+    AnyOf,
+    Behavior,
+    Comparison,
+    Domain,
+    Parameter,
+    Problem,
+    Rule,
+    SituationType,
+    Symbol,
+    ValueCondition,
+    ValueEffect,
+)
 from confab.trees import Element, Tree, behavior_tree, export_trees
 
 
@@ -129,6 +146,64 @@ def test_a_behaviour_tree_continues_from_each_state_of_its_plan(name: str) -> No
         reached, ticking = run(problem, plan, world)
         assert reached
         assert ticking.done == [str(step) for step in plan.primitives[number:]]
+
+
+WATER = Amount("WATER", ("tub",))
+
+
+def washing(goal: dict[str, str], water: int = 2) -> Problem:
+    """Return the problem of a tub that is filled, emptied and scrubbed; the tub is fine if it is clean, full or not dirty."""
+    fine = AnyOf(
+        (
+            (ValueCondition("CLEAN", ("tub",), TRUE),),
+            (Comparison(WATER, ">=", Fraction(8)),),
+            (ValueCondition("DIRTY", ("tub",), FALSE),),
+        )
+    )
+
+    def behavior(name: str, *parts: ValueEffect | AmountEffect, least: int = 0) -> Behavior:
+        asked = (Comparison(WATER, ">=", Fraction(least)),)
+        effects = tuple(part for part in parts if isinstance(part, ValueEffect))
+        return Behavior(name, 1, (), (), asked, effects, amounts=tuple(p for p in parts if isinstance(p, AmountEffect)))
+
+    behaviors = [
+        behavior("POUR", AmountEffect("WATER", ("tub",), "increase", Fraction(2))),
+        behavior("EMPTY", AmountEffect("WATER", ("tub",), "decrease", Fraction(2))),
+        behavior("SCRUB", ValueEffect("DONE", ("tub",), TRUE), ValueEffect("DIRTY", ("tub",), TRUE), least=4),
+        behavior(
+            "RINSE",
+            AmountEffect("WATER", ("tub",), "increase", Fraction(2)),
+            ValueEffect("CLEAN", ("tub",), TRUE),
+        ),
+    ]
+    truth = {name: SituationType(name, ("Tub",), "Truth", boolean=True) for name in ("DONE", "CLEAN", "DIRTY", "FINE")}
+    water_of = SituationType("WATER", ("Tub",), "WATER", quantity=Quantity(least=Fraction(0)))
+    rule = Rule("FINE", (Parameter("?tub", "Tub"),), (), (fine,))
+    domain = Domain({**truth, "WATER": water_of}, {one.name: one for one in behaviors}, rules={"FINE": (rule,)})
+    wanted = {Symbol(name, ("tub",)): value for name, value in goal.items()}
+    return Problem("urn:tub", domain, {"Tub": ("tub",)}, {}, {Symbol("WATER", ("tub",)): str(water)}, wanted)
+
+
+@pytest.mark.parametrize(
+    ("goal", "water", "names"),
+    [
+        ({"DONE": TRUE, "WATER": "2"}, 2, ["POUR", "SCRUB", "EMPTY"]),
+        ({"DONE": TRUE, "FINE": TRUE}, 4, ["RINSE", "SCRUB"]),
+        ({"DONE": TRUE, "FINE": TRUE}, 6, ["SCRUB", "RINSE"]),
+    ],
+    ids=[
+        "an amount returns to its value",
+        "a goal holds before the step",
+        "two alternatives at once",
+    ],
+)
+def test_a_behaviour_tree_executes_each_required_step_once(goal: dict[str, str], water: int, names: list[str]) -> None:
+    problem = washing(goal, water)
+    plan = Plan(tuple(Step((i,), problem.id_of(name, ()), 1, name, ()) for i, name in enumerate(names)))
+    assert not validate(problem, plan)
+    reached, ticking = run(problem, plan, SymbolicWorld(problem))
+    assert reached
+    assert [said.split()[-1] for said in ticking.done] == names
 
 
 class Undone(SymbolicWorld):
