@@ -119,13 +119,20 @@ def _needs(
     i: int,
     j: int,
 ) -> bool:
-    """Return whether primitive `j` must wait for the earlier primitive `i`."""
+    """Return whether primitive `j` must wait for the earlier primitive `i`.
+
+    A symbol that other primitives change between `i` and `j` gets its value from before `i` in a separate test, because `j` may
+    need any one of these changes.
+    """
     if writes[i].keys() & writes[j].keys():
         return True
-    live = {s: old for s, (old, new) in writes[i].items() if not any(s in writes[k] for k in range(i + 1, j))}
-    without = {s: v for s, v in {**states[j], **live}.items() if v is not None}
-    if not _same(problem, primitives[j], without, writes[j]):
-        return True
+    later = {symbol for k in range(i + 1, j) for symbol in writes[k]}
+    tests = [{s: old for s, (old, _) in writes[i].items() if s not in later}]
+    tests += [{s: old} for s, (old, _) in writes[i].items() if s in later and old != states[j].get(s)]
+    for test in tests:
+        without = {s: v for s, v in {**states[j], **test}.items() if v is not None}
+        if not _same(problem, primitives[j], without, writes[j]):
+            return True
     before = {**states[i], **{s: new for s, (_, new) in writes[j].items()}}
     return not _same(problem, primitives[i], before, writes[i])
 

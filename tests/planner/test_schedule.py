@@ -1,12 +1,14 @@
 """The necessary partial order of a plan, and execution with both hands at once."""
 
 from functools import cache
+from random import Random
 
 import networkx
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import confab
 from confab.planner.acting.schedule import PartialOrder, partial_order, ready, urgency_of, worker_of
 from confab.planner.plan import Plan, Step
 from confab.planner.validation import validate
@@ -44,6 +46,19 @@ def test_every_linear_order_of_the_partial_order_is_a_valid_plan(random: object)
     key = {i: random.random() for i in order}  # type: ignore[attr-defined]
     line = networkx.lexicographical_topological_sort(order, key=lambda i: key[i])
     assert validate(serving(), Plan(tuple(primitives[i] for i in line))) == []
+
+
+def test_a_step_that_needs_any_one_of_several_earlier_changes_waits_for_the_first_of_them() -> None:
+    scene = confab.load(
+        "panda-pair-serving"
+    )  # the other hand takes the first cup from the place of the second, and puts it down
+    plan = scene.plan().plan
+    assert plan is not None
+    order, random = partial_order(scene.problem, plan.primitives), Random(1)
+    for _ in range(20):
+        key = {i: random.random() for i in order}
+        line = networkx.lexicographical_topological_sort(order, key=key.__getitem__)
+        assert validate(scene.problem, Plan(tuple(plan.primitives[i] for i in line))) == []
 
 
 def test_reaching_for_a_cup_waits_for_its_put_down_and_reaching_for_a_bottle_waits_for_no_step() -> None:
