@@ -122,7 +122,7 @@ def _needs(
     """Return whether primitive `j` must wait for the earlier primitive `i`.
 
     A symbol that other primitives change between `i` and `j` gets its value from before `i` in a separate test, because `j` may
-    need any one of these changes.
+    need any one of these changes. If `j` came first, `i` would have to leave the changes of `j` as they are.
     """
     if writes[i].keys() & writes[j].keys():
         return True
@@ -134,7 +134,7 @@ def _needs(
         if not _same(problem, primitives[j], without, writes[j]):
             return True
     before = {**states[i], **{s: new for s, (_, new) in writes[j].items()}}
-    return not _same(problem, primitives[i], before, writes[i])
+    return not _same(problem, primitives[i], before, {**writes[i], **writes[j]})
 
 
 def _same(problem: Problem, step: Step, state: State, writes: Mapping[Symbol, tuple[str | None, str]]) -> bool:

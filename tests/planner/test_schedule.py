@@ -12,6 +12,7 @@ import confab
 from confab.planner.acting.schedule import PartialOrder, partial_order, ready, urgency_of, worker_of
 from confab.planner.plan import Plan, Step
 from confab.planner.validation import validate
+from confab.reasoner.symbols import FALSE, TRUE, Behavior, Domain, Problem, SituationType, Symbol, ValueEffect
 from tests.planner.serving import planned, serving
 from tests.planner.slots import schedule
 
@@ -59,6 +60,24 @@ def test_a_step_that_needs_any_one_of_several_earlier_changes_waits_for_the_firs
         key = {i: random.random() for i in order}
         line = networkx.lexicographical_topological_sort(order, key=key.__getitem__)
         assert validate(scene.problem, Plan(tuple(plan.primitives[i] for i in line))) == []
+
+
+def test_a_step_waits_for_an_earlier_step_that_would_undo_its_effects_even_if_that_step_changes_nothing_in_the_plan() -> (
+    None
+):
+    def behavior(name: str, **values: str) -> Behavior:
+        return Behavior(
+            name, 1, (), (), (), tuple(ValueEffect(which, ("hall",), value) for which, value in values.items())
+        )
+
+    behaviors = [behavior("ENTER", LAMP=TRUE, VISITED=TRUE), behavior("LEAVE", LAMP=FALSE)]
+    situations = {name: SituationType(name, ("Room",), "Truth", boolean=True) for name in ("LAMP", "VISITED")}
+    lamp, visited = (Symbol(name, ("hall",)) for name in situations)
+    domain = Domain(situations, {one.name: one for one in behaviors})
+    problem = Problem("urn:hall", domain, {"Room": ("hall",)}, {}, {lamp: TRUE}, {lamp: FALSE, visited: TRUE})
+    primitives = [Step((number,), number, 1, one.name, ()) for number, one in enumerate(behaviors)]
+    assert validate(problem, Plan(tuple(primitives))) == []
+    assert networkx.has_path(partial_order(problem, primitives), 0, 1)
 
 
 def test_reaching_for_a_cup_waits_for_its_put_down_and_reaching_for_a_bottle_waits_for_no_step() -> None:
