@@ -22,7 +22,7 @@ from confab.reasoner.graph.knowledge import BASE, KnowledgeError, KnowledgeGraph
 from confab.reasoner.names import Names
 from confab.reasoner.possible import ImpossibleStateError, refuse_impossible
 from confab.reasoner.reading.problem import Reading
-from confab.reasoner.symbols import State, Symbol
+from confab.reasoner.symbols import Problem, State, Symbol
 from confab.reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, OWL, TYPE
 
 FACTS = """
@@ -75,7 +75,7 @@ def load_observed(path: Path, reading: Reading) -> Reading:
         raise KnowledgeError(f"{path}: holds no observed facts; 'confab run' and 'confab execute' write such a file")
     seen: dict[Symbol, str] = {}
     for iri, node in nodes.items():
-        symbol = _symbol(iri, node, reading.problem.initial, path)
+        symbol = _symbol(iri, node, reading.problem, path)
         if (other := seen.setdefault(symbol, node["value"])) != node["value"]:
             raise KnowledgeError(
                 f"{path}: {symbol} is {other} and {node['value']}, but only one of the two can be observed; "
@@ -95,12 +95,25 @@ def observed_iri(scene: str) -> str:
     return f"{scene.rstrip('#/')}.observed"
 
 
-def _symbol(iri: str, node: Mapping[str, str], known: State, path: Path) -> Symbol:
+def _symbol(iri: str, node: Mapping[str, str], problem: Problem, path: Path) -> Symbol:
     arguments = tuple(node[name] for name in ARGUMENTS if name in node)
     symbol = Symbol(node.get("situationType", ""), arguments)
-    if symbol not in known or "value" not in node:
+    if (symbol not in problem.initial and not _is_false(symbol, problem)) or "value" not in node:
         raise KnowledgeError(f"{path}: <{iri}> names {symbol}, which the scene doesn't have; observe this scene again")
     return symbol
+
+
+def _is_false(symbol: Symbol, problem: Problem) -> bool:
+    """Return whether a symbol is of a boolean situation type of the scene that rules don't define; without a value it is false."""
+    kind = problem.domain.situations.get(symbol.situation)
+    if (
+        kind is None
+        or not kind.boolean
+        or kind.name in problem.domain.rules
+        or len(kind.arguments) != len(symbol.arguments)
+    ):
+        return False
+    return all(one in problem.members(of) for one, of in zip(symbol.arguments, kind.arguments, strict=True))
 
 
 def _amount(number: str, path: Path) -> str:

@@ -24,6 +24,16 @@ def test_an_observed_value_replaces_the_value_of_the_scene(tmp_path: Path) -> No
     assert replace(seen.problem, initial={**seen.problem.initial, CUP2: "location1"}) == reading.problem
 
 
+def test_a_fact_that_is_false_in_the_scene_can_be_observed_as_true(tmp_path: Path) -> None:
+    graph, closed = load("drawers-small"), Symbol("OPENED", ("box",))
+    reading, file = read(graph), tmp_path / "observed.ttl"
+    save_observed(file, {closed: "true"}, reading.names, graph.scene)
+    assert load_observed(file, reading).problem.initial[closed] == "true"
+    save_observed(file, {Symbol("OPENED", ("letter",)): "true"}, reading.names, graph.scene)
+    with pytest.raises(KnowledgeError, match="which the scene doesn't have"):
+        load_observed(file, reading)
+
+
 def test_an_observed_amount_replaces_the_amount_of_the_scene(tmp_path: Path) -> None:
     graph, servings = load("three-cups"), Symbol("SERVINGS", ("bottle1",))
     reading, file = read(graph), tmp_path / "observed.ttl"
