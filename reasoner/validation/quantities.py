@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from math import inf
 
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, exact, inside, situations_in, written
-from confab.reasoner.language import groups, walk
+from confab.reasoner.language import groups, is_variable, walk
 from confab.reasoner.reading.goals import some_of
 from confab.reasoner.sentences import counted, plain
 from confab.reasoner.symbols import AmountEffect, Behavior, ClassCondition, Comparison, Condition, Problem, Witness
@@ -124,6 +124,41 @@ def numbers_missing(case: ReadCase) -> Iterator[Fault]:
             "a comparison with a missing number is false, so no such behaviour is applicable to these individuals",
             f"state {relation} of {some}, or let {readers} be about another class than {kind}",
         )
+
+
+def numbers_missing_for_members(case: ReadCase) -> Iterator[Fault]:
+    """Find numbers that an effect on all members of a class reads, and that are stated for some of the members only."""
+    problem, names = case.problem, case.names
+    for name, behavior in problem.domain.behaviors.items():
+        found: dict[tuple[str, str], dict[str, set[tuple[str, ...]]]] = defaultdict(lambda: defaultdict(set))
+        for effect in behavior.amounts:
+            for part in inside(effect.amount) if not effect.when else ():
+                if (
+                    isinstance(part, Measure)
+                    and len(its := [one for one in part.arguments if one in behavior.spread]) == 1
+                ):
+                    rows = problem.relations.get(part.relation, ())
+                    found[effect.situation, part.relation][its[0]].update(_values_of_variables(part.arguments, rows))
+        for (situation, relation), by in found.items():
+            every = set[tuple[str, ...]]().union(*by.values())
+            missing = sorted((*values, member) for values in every for member, its in by.items() if values not in its)
+            if missing:
+                least, more = " and ".join(missing[0]), f" and {len(missing) - 1} others" * (len(missing) > 1)
+                here = f", here with {missing[0][0]}" if len(missing[0]) > 1 else ""
+                yield (
+                    names.iri(name),
+                    f"{name} changes {situation} of each member of a class by {relation}, but without the number of {least}{more}",
+                    f"an effect without a number makes the behaviour inapplicable{here}",
+                    f"state {relation} of {least} (0 for no change)",
+                )
+
+
+def _values_of_variables(arguments: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[tuple[str, ...]]:
+    """Yield the values of the variables among the arguments of a number in each row that has the other arguments."""
+    for row in rows:
+        pairs = list(zip(arguments, row, strict=False))
+        if all(is_variable(argument) or argument == value for argument, value in pairs):
+            yield tuple(value for argument, value in pairs if is_variable(argument))
 
 
 def _measured(

@@ -40,6 +40,7 @@ RULES_ON_PROBLEMS: dict[str, Callable[[ReadCase], Iterator[Fault]]] = {
     "product-of-amounts": quantities.multiplied_amounts,
     "conclusion-outside-class": definitions.conclusions_outside_class,
     "number-missing": quantities.numbers_missing,
+    "number-missing-for-member": quantities.numbers_missing_for_members,
     "defined": definitions.defined,
 }
 """Rules that a graph is checked with if its planning problem can be read."""
@@ -49,6 +50,7 @@ WARNINGS = frozenset(
         "crowded",
         "every-member-required",
         "number-missing",
+        "number-missing-for-member",
         "other-kind",
         "product-of-amounts",
         "repeated-name",
