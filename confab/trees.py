@@ -6,7 +6,7 @@ import keyword
 import re
 import runpy
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -58,8 +58,16 @@ RESERVED |= {
     "Sleep",
     "Script",
     "ScriptCondition",
+    "AlwaysSuccess",
+    "RetryUntilSuccessful",
 }
 """Reserved names of BehaviorTree.CPP and py_trees, which leaves, ports and subtrees can't have."""
+
+
+MAIN = "attempts"
+"""The name of the whole tree, which makes attempts."""
+TREES = {MAIN, "position", "plan", "undone_steps"}
+"""Names of subtrees; BehaviorTree.CPP refuses leaves with the same names."""
 
 
 @dataclass(frozen=True)
@@ -128,6 +136,7 @@ class _ElementWriter:
         self.subtrees: dict[str, Element] = {}
         self.leaves: dict[str, Fact | Condition | Step] = {}
         self.possible: set[str] = set()
+        self.actions = {_free(_identifier(behavior), TREES) for behavior in problem.domain.behaviors}
 
     def lowered(self, node: TreeNode) -> Element:
         """Return the element of a library for a node of the plan's behaviour tree."""
@@ -160,6 +169,7 @@ class _ElementWriter:
 
     def leaf(self, kind: str, name: str, ports: Mapping[str, str], what: Fact | Condition | Step) -> Element:
         """Return a new leaf with a unique key."""
+        name = _free(name, TREES if isinstance(what, Step) else TREES | self.actions)
         key = f"{kind[0].lower()}{len(self.leaves)}"
         self.leaves[key] = what
         return Element(kind, name, ports=ports, key=key)
@@ -185,13 +195,16 @@ def _identifier(name: str) -> str:
     return f"{found}_" if found in RESERVED or keyword.iskeyword(found) else found
 
 
+def _free(name: str, taken: Collection[str]) -> str:
+    """Return a name that isn't taken."""
+    while name in taken:
+        name += "_"
+    return name
+
+
 # ------------------------------------------------------------------------------------------------------------- BehaviorTree.CPP
 
 TAGS = {"Fallback": "ReactiveFallback", "Sequence": "ReactiveSequence", "Once": "Sequence", "Parallel": "Parallel"}
-
-
-MAIN = "attempts"
-"""The name of the whole tree, which makes attempts."""
 
 
 def attempt(tree: Tree) -> Element:
@@ -230,6 +243,8 @@ def _xml(element: Element) -> ElementTree.Element:
             return ElementTree.Element("Sleep", {"msec": "1", "name": "tick again"})
         case "Condition" | "Action":
             return ElementTree.Element(element.name, {"name": element.key, **element.ports})
+        case _ if not element.children:
+            return ElementTree.Element("AlwaysSuccess")  # a control node needs a child
         case kind:
             attributes = {"success_count": "-1", "failure_count": "1"} if kind == "Parallel" else {}
             found = ElementTree.Element(TAGS[kind], attributes)

@@ -275,6 +275,30 @@ def test_the_files_of_a_behaviour_tree_are_complete_and_define_their_leaves(tmp_
         export_trees(problem, plan, tmp_path)
 
 
+def test_the_tree_of_a_plan_without_steps_has_no_node_without_a_child(tmp_path: Path) -> None:
+    problem = washing({"DONE": TRUE})
+    held = replace(problem, initial={**problem.initial, **problem.goal})
+    assert run(held, Plan(()), SymbolicWorld(held))[0]
+    root = ElementTree.parse(export_trees(held, Plan(()), tmp_path)[0]).getroot()
+    assert [node.tag for node in root.iter() if node.tag.endswith(("Sequence", "Fallback")) and len(node) == 0] == []
+
+
+@pytest.mark.parametrize(
+    ("name", "leaves"), [("plan", {"plan__", "plan_", "plan_possible"}), ("wash", {"wash_", "wash", "wash_possible"})]
+)
+def test_a_leaf_never_has_the_name_of_a_subtree_or_of_another_kind_of_leaf(name: str, leaves: set[str]) -> None:
+    behavior = Behavior(name, 1, (), (), (), (ValueEffect(name, ("tub",), TRUE),))
+    situations = {name: SituationType(name, ("Tub",), "Truth", boolean=True)}
+    problem = replace(washing({name: TRUE}), domain=Domain(situations, {name: behavior}), initial={})
+    tree = behavior_tree(problem, Plan((Step((0,), 0, 1, name, ()),)))
+    assert {one.name for element in tree.subtrees.values() for one in every(element) if one.key} == leaves
+    assert "plan" in tree.subtrees
+
+
+def every(element: Element) -> list[Element]:
+    return [element, *(one for child in element.children for one in every(child))]
+
+
 def test_the_command_line_exports_trees(tmp_path: Path) -> None:
     said = CliRunner().invoke(app, ["export", "rooms-snacks", "--bt", "-o", str(tmp_path / "out")])
     assert said.exit_code == 0, said.output
