@@ -55,7 +55,8 @@ BUSY = Fraction(103, 100)
 DISTURBING, BARREN_ROUNDS = 4, 6
 """Number of changes that begin a further round, whatever they cost, and maximum number of further rounds without a better schedule.
 
-Further rounds follow only if the makespan is minimised with a time limit. Each round begins with the best sequence.
+Further rounds follow only if the schedule is late, or if the makespan is minimised with a time limit. Each round begins with the
+best sequence.
 """
 MOST_KNOWN = 4
 """Maximum number of known sequences of steps that are tried for a stretch."""
@@ -280,8 +281,9 @@ class _SharingSearch:
             return
         random, barren = Random(0), 0
         self.improve(self.best, random)
-        most = BARREN_ROUNDS if self.shorten and self.until is not None else 0
-        while barren < most and not self.enough(self.best):
+        while barren < BARREN_ROUNDS and not self.enough(self.best):
+            if not self.best.cost[0] and (not self.shorten or self.until is None):
+                break
             cost = self.best.cost
             self.improve(self.disturbed(self.best, random), random)
             barren = 0 if self.best.cost < cost else barren + 1
