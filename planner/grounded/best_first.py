@@ -142,7 +142,7 @@ class Search:
     """A search for a plan of a grounded task that can be interrupted and resumed; its two search orders take turns."""
 
     def __init__(self, task: Task, deadline: float | None = None, counts: Counts | None = None) -> None:
-        self.task, self.deadline, self.work = task, deadline, 0
+        self.task, self.deadline, self.work, self.expanded = task, deadline, 0, 0
         self.counts = Counts() if counts is None else counts
         self._turns = self._explored(task)
         self._result: Flat | None = None
@@ -152,12 +152,14 @@ class Search:
         while self._result is None:
             if self.work >= most_work:
                 return self._ended(Status.GAVE_UP, "the limit of work came first")
-            if self.counts.expanded >= expansions:
+            if self.expanded >= expansions:
                 return self._ended(Status.GAVE_UP, f"the limit of {expansions} expansions came first")
             if self.deadline is not None and perf_counter() > self.deadline:
                 return self._ended(Status.GAVE_UP, "the time limit came first")
+            before = self.counts.expanded
             try:
                 self.work += next(self._turns)
+                self.expanded += self.counts.expanded - before
             except StopIteration as end:
                 self._result = end.value
             except OutOfTimeError:

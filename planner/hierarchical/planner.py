@@ -198,10 +198,10 @@ class LowestLevelPlan:
         """
         call, space = self.call, self.call.space
         plans = regroupings(call.problem, plan, call.program.levels[-1], call.using)
-        self.plan = next((one for one in plans if not validate(call.problem, one)), None)
-        if self.plan is None:
+        found = next((one for one in plans if not validate(call.problem, one)), None)
+        if found is None:
             return False
-        self.cheapest = cheapest
+        self.plan, self.cheapest = found, cheapest
         stays = all(step.level == call.program.levels[0] for step in self.plan.steps)
         space.most_work = min(space.most_work, space.worked + max(space.worked, LOOKING) * (1 if stays else TURNS))
         if cheapest and stays and not any(step.joined for step in self.plan.steps):
@@ -213,7 +213,7 @@ class LowestLevelPlan:
         """Replace the steps of the call by the plan."""
         call, (first, *lower) = self.call, self.call.program.levels
         assert self.plan is not None
-        call.steps, call.given_up = as_refined(call, self.plan.steps), []
+        call.steps, call.given_up, call.kept = as_refined(call, self.plan.steps), [], dict(call.goal)
         if self.cheapest:
             call.bound = cost_of(call.problem, self.plan)
         if any(step.level != first for step in self.plan.steps):
@@ -229,7 +229,7 @@ def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool, lowest: Lowe
     proofs.certify(growth=FINALLY)
     if lower and not leave_levels:
         return f"no plan of level {first} was found that can be refined, and {NOT_LEFT}"
-    reason = proofs.search(BITS * limits.work, call.space.counts[(first, *lower)[-1]].expanded + limits.expansions)
+    reason = proofs.search(BITS * limits.work, limits.expansions)
     if proofs.too_large is None:
         return reason.text
     if without_grounding(call, TRIALS):

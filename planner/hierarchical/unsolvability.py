@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -111,7 +112,7 @@ class Proofs:
         if not self._may_succeed():
             return
         lowest = self.lowest()
-        if isinstance(lowest, Reason) or self._solved:
+        if isinstance(lowest, Reason):
             return
         states = max(LOOKING, EASIER * space.worked) // max(len(lowest.owners), LEAST)
         if states >= 2 * self._states:
@@ -121,10 +122,10 @@ class Proofs:
             if result is not None:
                 self._states = math.inf
                 self._solved = self.found is None or self.found(result, True)
-        self.search(BITS * space.effort // TURNS)
+        self.search(BITS * space.effort // TURNS, space.effort // (LEAST * TURNS))
 
     def search(self, most_work: float, expansions: float = math.inf) -> Reason:
-        """Search the lowest level as a whole until this has cost `most_work`, or until a number of expansions on the level.
+        """Search the lowest level as a whole until this has cost `most_work` or a number of expansions.
 
         Pass each plan to `found`. Raise `UnsolvableError` if there is a proof; otherwise return why the search ends.
         """
@@ -164,8 +165,11 @@ class Proofs:
         rests = {symbol: problem.domain.situations[symbol.situation].rest for symbol in problem.initial}
         goal = problem.goal_on(level)
         more = {s: rest for s, rest in rests.items() if rest and s not in goal and problem.first_level(s) <= level}
-        if more and not isinstance(task := ground(problem, level, goal={**goal, **more}), Reason):
-            yield task
+        if more:
+            with suppress(UngroundableError, MemoryError):
+                task = ground(problem, level, goal={**goal, **more}, deadline=self.call.space.deadline)
+                if not isinstance(task, Reason):
+                    yield task
 
     def _may_succeed(self) -> bool:
         """Return whether a proof is wanted, and no advice promises a plan after little work."""
