@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from itertools import product
+from random import Random
 
 import pytest
 
@@ -10,9 +11,10 @@ import confab
 from confab.planner.grounded.best_first import plan_level
 from confab.planner.grounded.grounding import ground
 from confab.planner.grounded.task import Task
-from confab.planner.hierarchical.planner import Call, compiled
+from confab.planner.hierarchical.planner import Call, LowestLevelPlan, compiled
 from confab.planner.hierarchical.planner import plan as default
 from confab.planner.hierarchical.scope import LEAST
+from confab.planner.hierarchical.shortening import reordered
 from confab.planner.hierarchical.unsolvability import Proofs, exhausted
 from confab.planner.levels import levels_left
 from confab.planner.paper.hierarchy import DOUBT
@@ -214,6 +216,19 @@ def test_a_plan_of_the_lowest_level_is_found_while_planning_goal_by_goal_goes_on
     ((plan, _),) = found
     assert works > 1
     assert validate(problem, plan) == []
+
+
+def test_a_plan_of_the_lowest_level_is_shortened_for_all_goals_of_the_task() -> None:
+    problem = tabletop()
+    call = Call(problem, compiled(problem), None, 500)
+    call.kept = dict(list(call.goal.items())[:2])  # planning goal by goal has achieved some of the goals
+    flat = plan_level(problem, problem.domain.levels[-1])
+    assert flat.plan is not None
+    lowest = LowestLevelPlan(call)
+    assert lowest.keep(flat.plan, False)
+    lowest.replace_steps()
+    reordered(call, 10**6, lambda _: None, Random(0))
+    assert validate(problem, call.tree()) == []
 
 
 def test_a_shorter_order_of_goals_also_achieves_the_goals_that_level_1_does_not_see() -> None:
