@@ -62,8 +62,6 @@ RESERVED |= {
     "RetryUntilSuccessful",
 }
 """Reserved names of BehaviorTree.CPP and py_trees, which leaves, ports and subtrees can't have."""
-
-
 MAIN = "attempts"
 """The name of the whole tree, which makes attempts."""
 TREES = {MAIN, "position", "plan", "undone_steps"}
@@ -91,8 +89,8 @@ class Tree:
     """The behaviour tree of a plan.
 
     An attempt ticks the subtree `first` once, and then the subtree `then` until it succeeds or fails. `subtrees` has all subtrees
-    by name. `leaves` has the condition or the primitive of each leaf, by
-    the leaf's key. `possible` has the names of the leaves that check the preconditions of a primitive.
+    by name. `leaves` has the condition or the primitive of each leaf, by the leaf's key. `possible` has the names of the leaves
+    that check the preconditions of a primitive.
     """
 
     first: str

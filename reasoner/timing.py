@@ -109,8 +109,8 @@ def _compared_before(condition: Comparison, effects: Iterable[Sequence[Effect]])
     if not there:
         return (condition,)
     found: list[Condition] = [Comparison(cell, "=", cell) for cell in there]  # no effect changes a missing amount
-    fixed = isinstance(left, Fraction) and isinstance(right, Fraction)
-    if not fixed or COMPARING[condition.operator](left, right) is condition.negated:  # type: ignore[arg-type]
+    holds = COMPARING[condition.operator]
+    if not (isinstance(left, Fraction) and isinstance(right, Fraction) and holds(left, right) is not condition.negated):
         found.append(replace(condition, left=left, right=right))
     return tuple(found)
 
