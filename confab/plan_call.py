@@ -52,7 +52,10 @@ if TYPE_CHECKING:
     from confab.planner.timed.plan import TimedPlan
 
 OURS = 0.6
-"""The share of the time limit that Confab's own search may use if an engine may follow, or proofs that precede a schedule."""
+"""The share of the time limit in which Confab's own search must find a plan if an engine may follow.
+
+The same share is for optimal planning before a schedule.
+"""
 OURS_WORK = 10_000_000
 """Maximum work of Confab's own search (states times operators) before an engine is tried, if there is no time limit.
 
@@ -356,12 +359,16 @@ def search(task: PlanningTask, problem: Problem, how: Searching) -> Outcome:
 def own_request(task: PlanningTask, problem: Problem, how: Searching, engines: bool) -> Request:
     """Return the request for Confab's own search; if engines or scheduling may follow, a part of the time is kept for them."""
     options, seconds, memory = task.options, task.deadline.left, task.memory
-    timed = asks_for_times(problem, options.minimise)
+    timed, finding = asks_for_times(problem, options.minimise), 1.0
     if seconds is not None:
         from confab.engines import some_installed
 
-        more = (timed and how.mode == "optimal") or (engines and some_installed(problem))
-        seconds = min(seconds * how.share * (OURS if more else 1.0), max(seconds - task.checking, seconds / 2))
+        then = engines and some_installed(problem)
+        if then and not timed and how.mode not in {"optimal", "paper"}:
+            finding = OURS
+        more = then or (timed and how.mode == "optimal")
+        share = how.share * (OURS if more and finding == 1.0 else 1.0)
+        seconds = min(seconds * share, max(seconds - task.checking, seconds / 2))
     once = seconds is None or timed
     shortening = how.shortening or ("once" if once else "repeated")
     links = (
@@ -374,7 +381,7 @@ def own_request(task: PlanningTask, problem: Problem, how: Searching, engines: b
     return Request(
         task.with_measured_durations(with_unit_costs(problem) if options.minimise == "steps" else problem),
         how.mode,
-        Limits(seconds=seconds, work=how.most_work, shortening=shortening, accepts=how.accepts),
+        Limits(seconds=seconds, work=how.most_work, shortening=shortening, accepts=how.accepts, finding=finding),
         None if memory is None or isinstance(memory, Links) else memory.advisor,
         links,
         task.grounds,

@@ -402,7 +402,8 @@ Shortening = Literal["none", "brief", "once", "repeated"]
 class Limits:
     """Limits of a planning call.
 
-    `seconds` limits the whole call, unless `seconds` is None. In the paper's mode, `expansions` limits each search. In the
+    `seconds` limits the whole call, unless `seconds` is None. In the modes guarded, leading and strict, a first plan must be
+    found within the share `finding` of this time; the time after a first plan is for a shorter plan. In the paper's mode, `expansions` limits each search. In the
     other modes, `expansions` limits the sum of all searches for single goals, and separately the final search for all goals
     together. `work` limits searches in grounded levels and parts of levels until a plan is found. The unit of `work` is states
     times operators, about a microsecond each. `shortening` is the work for a shorter plan. With "none", there is no round;
@@ -416,6 +417,7 @@ class Limits:
     work: float = math.inf
     shortening: Shortening = "once"
     accepts: Callable[[Plan], bool] | None = None
+    finding: float = 1.0
 
     def end(self, share: float = 1.0) -> float | None:
         """Return the time at which a share of the remaining time ends, on the clock of `perf_counter`, or None without a limit.

@@ -98,7 +98,7 @@ def solve(request: Request) -> Outcome:
         return Outcome(Status.GAVE_UP, reason=OUT_OF_MEMORY)
     except OutOfTimeError as error:
         return Outcome(Status.GAVE_UP, reason=Reason(str(error)))
-    if outcome.status is Status.GAVE_UP and (proof := _last_proof(request.problem, deadline)):
+    if outcome.status is Status.GAVE_UP and (proof := _last_proof(request.problem, deadline, request.limits.finding)):
         outcome = replace(outcome, status=Status.UNSOLVABLE, reason=proof.reason, certificate=proof.certificate)
     if outcome.plan is None or schedule_of(outcome) is not None:
         with within(deadline):
@@ -190,12 +190,12 @@ def _paper(request: Request) -> Outcome:
     )
 
 
-def _last_proof(problem: Problem, deadline: Deadline) -> UnsolvableError | None:
-    """Return a proof that few tests find after the search has reached another limit than the time limit."""
+def _last_proof(problem: Problem, deadline: Deadline, finding: float = 1.0) -> UnsolvableError | None:
+    """Return a proof that few tests find after the search has reached another limit than its share `finding` of the time."""
     from confab.planner.hierarchical.planner import SEARCHING
     from confab.planner.hierarchical.unsolvability import AT_ONCE, impossible
 
-    if deadline.left is not None and deadline.left < (1 - SEARCHING) * deadline.seconds:
+    if deadline.left is not None and deadline.left < (1 - SEARCHING * finding) * deadline.seconds:
         return None
     events = by_events(problem)
     with suppress(OutOfTimeError):

@@ -112,7 +112,7 @@ def _plan(
     advised: Callable[[Call], None],
     first: Outcome | None,
 ) -> Outcome:
-    deadline, until = limits.end(SEARCHING), limits.end(SHORTENING)
+    deadline, until = limits.end(SEARCHING * limits.finding), limits.end(SHORTENING)
     one_level = improve > 0 and len(problem.domain.levels) == 1
     vast = one_level and is_vast(problem)
     flat = None
@@ -128,7 +128,7 @@ def _plan(
     call.accepts = limits.accepts or call.accepts
     advised(call)
     levels = call.program.levels if leave_levels else call.program.levels[:1]
-    lowest = LowestLevelPlan(call)
+    lowest = LowestLevelPlan(call, limits.end(SEARCHING))
     agenda = Agenda(call, levels, found=lowest.keep if leave_levels else None)
     try:
         resumed = first is not None and call.resume(first)
@@ -177,10 +177,10 @@ def before_the_check(call: Call, until: float | None) -> float | None:
 
 
 class LowestLevelPlan:
-    """A plan of the lowest level that is found during planning goal by goal."""
+    """A plan of the lowest level that is found during planning goal by goal; then this goes on until the time `end` at most."""
 
-    def __init__(self, call: Call) -> None:
-        self.call = call
+    def __init__(self, call: Call, end: float | None) -> None:
+        self.call, self.end = call, end
         self.plan: Plan | None = None
         self.cheapest = False
 
@@ -201,7 +201,7 @@ class LowestLevelPlan:
         found = next((one for one in plans if not validate(call.problem, one)), None)
         if found is None:
             return False
-        self.plan, self.cheapest = found, cheapest
+        self.plan, self.cheapest, space.deadline = found, cheapest, self.end
         stays = all(step.level == call.program.levels[0] for step in self.plan.steps)
         space.most_work = min(space.most_work, space.worked + max(space.worked, LOOKING) * (1 if stays else TURNS))
         if cheapest and stays and not any(step.joined for step in self.plan.steps):

@@ -54,8 +54,8 @@ class Proofs:
     """Attempts to prove that a call's problem has no plan; the attempts so far cost about as much as the searches so far.
 
     If a proof isn't `wanted`, no attempt is made. `found` is called with a plan of the lowest level, and with whether no plan is
-    cheaper; it returns whether this is a plan of the call's problem. Then no further plan is searched. Without `found`, the
-    lowest level isn't searched.
+    cheaper; it returns whether this is a plan of the call's problem. Then there is no proof, and no further plan is searched.
+    Without `found`, the lowest level isn't searched.
     """
 
     call: Call
@@ -65,7 +65,6 @@ class Proofs:
     _tests: int = 1
     _states: float = 0
     _search: Search | None = None
-    _solved: bool = False
 
     def __post_init__(self) -> None:
         """Begin with the lowest level and its own goals."""
@@ -121,7 +120,7 @@ class Proofs:
                 raise UnsolvableError(result)
             if result is not None:
                 self._states = math.inf
-                self._solved = self.found is None or self.found(result, True)
+                self.wanted = self.found is None or not self.found(result, True)
         self.search(BITS * space.effort // TURNS, space.effort // (LEAST * TURNS))
 
     def search(self, most_work: float, expansions: float = math.inf) -> Reason:
@@ -132,7 +131,7 @@ class Proofs:
         from confab.planner.grounded.best_first import Search
 
         space = self.call.space
-        while self.found is not None and not self._solved:
+        while self.found is not None and self.wanted:
             if self._search is None:
                 task = next(self._tasks, None)
                 if task is None:
@@ -144,7 +143,7 @@ class Proofs:
             if flat.status is Status.UNSOLVABLE and flat.reason is not None and task is self._lowest:
                 raise UnsolvableError(flat.reason)
             self._search = None
-            self._solved = flat.status is Status.SOLVED and self.found(Plan(task.steps(flat.plan)), False)
+            self.wanted = flat.status is not Status.SOLVED or not self.found(Plan(task.steps(flat.plan)), False)
         return Reason("a plan was found")
 
     def lowest(self) -> Task | Reason:

@@ -18,7 +18,8 @@ from confab.engines import Answer, answer, at_rest, plan_by_engine, some_install
 from confab.planner.grounded.best_first import search
 from confab.planner.grounded.grounding import ground
 from confab.planner.grounded.task import Task
-from confab.planner.plan import Outcome, Reason, Status
+from confab.planner.plan import Limits, Outcome, Reason, Status
+from confab.planner.solve import Request, solve
 from confab.planner.validation import validate
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import Deadline
@@ -96,6 +97,21 @@ def test_an_installed_engine_runs_if_the_own_search_gives_up(monkeypatch: pytest
         outcome = scene.plan(time_limit=seconds).outcome
         assert outcome.status is Status.GAVE_UP
         assert outcome.reason == Reason(f"the limit came first; an installed engine was tried {when}: e: timeout")
+
+
+def test_the_time_that_is_kept_for_an_engine_shortens_a_plan_that_confab_finds(monkeypatch: pytest.MonkeyPatch) -> None:
+    limits = list[Limits]()
+
+    def solved(request: Request) -> Outcome:
+        limits.append(request.limits)
+        return solve(request)
+
+    monkeypatch.setattr("confab.plan_call.solve", solved)
+    for engine in (None, "none"):
+        assert confab.load(SCENE).plan(time_limit=60, engine=engine).outcome.engine is None
+    kept, none = limits
+    assert kept.seconds == pytest.approx(none.seconds, abs=3) and kept.seconds is not None and kept.seconds > 50
+    assert (kept.finding, none.finding) == (0.6, 1.0)
 
 
 def test_without_a_time_limit_an_engine_runs_after_bounded_work_and_own_search_continues_if_it_fails(

@@ -199,7 +199,9 @@ def test_the_number_of_examined_states_grows_with_the_work_of_the_searches() -> 
         proofs.examine()
 
 
-def test_a_plan_of_the_lowest_level_is_found_while_planning_goal_by_goal_goes_on() -> None:
+def test_a_plan_of_the_lowest_level_is_found_while_planning_goal_by_goal_goes_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     problem, found = tabletop(), list[tuple[Plan, bool]]()
 
     def keep(plan: Plan, cheapest: bool) -> bool:
@@ -212,7 +214,8 @@ def test_a_plan_of_the_lowest_level_is_found_while_planning_goal_by_goal_goes_on
         proofs.examine()
         works += 1
         proofs.call.space.worked = 2 * proofs.call.space.worked + 1
-    proofs.examine()  # finds no further plan
+    monkeypatch.setattr("confab.planner.hierarchical.unsolvability.impossible", pytest.fail)
+    proofs.attempt()  # finds no further plan, and looks for no proof
     ((plan, _),) = found
     assert works > 1
     assert validate(problem, plan) == []
@@ -224,7 +227,7 @@ def test_a_plan_of_the_lowest_level_is_shortened_for_all_goals_of_the_task() -> 
     call.kept = dict(list(call.goal.items())[:2])  # planning goal by goal has achieved some of the goals
     flat = plan_level(problem, problem.domain.levels[-1])
     assert flat.plan is not None
-    lowest = LowestLevelPlan(call)
+    lowest = LowestLevelPlan(call, None)
     assert lowest.keep(flat.plan, False)
     lowest.replace_steps()
     reordered(call, 10**6, lambda _: None, Random(0))
