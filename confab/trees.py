@@ -36,31 +36,15 @@ from confab.reasoner.symbols import Condition, Fact, Problem
 RETRIES = 5
 """An exported tree fails after this number of failures; after each earlier failure, it starts again."""
 
-RESERVED = {
-    "ID",
-    "name",
-    "kind",
-    "key",
-    "leaf",
-    "Action",
-    "Condition",
-    "Control",
-    "Decorator",
-    "SubTree",
-    "BehaviorTree",
-}
-RESERVED |= {
-    "Sequence",
-    "Fallback",
-    "Parallel",
-    "ReactiveSequence",
-    "ReactiveFallback",
-    "Sleep",
-    "Script",
-    "ScriptCondition",
-    "AlwaysSuccess",
-    "RetryUntilSuccessful",
-}
+RESERVED = """
+ID name kind key leaf Action Condition Control Decorator BehaviorTree SubTree SubTreePlus TestNode
+Sequence SequenceStar SequenceWithMemory AsyncSequence ReactiveSequence Fallback AsyncFallback ReactiveFallback
+Parallel ParallelAll IfThenElse WhileDoElse TryCatch ManualSelector Switch2 Switch3 Switch4 Switch5 Switch6
+Inverter ForceSuccess ForceFailure Repeat RetryUntilSuccessful RetryUntilSuccesful KeepRunningUntilFailure
+Delay RunOnce Timeout Precondition ConsumeQueue LoopInt LoopBool LoopDouble LoopString
+SkipUnlessUpdated WaitValueUpdate WasEntryUpdated
+AlwaysSuccess AlwaysFailure Script ScriptCondition SetBlackboard UnsetBlackboard Sleep
+"""
 """Reserved names of BehaviorTree.CPP and py_trees, which leaves, ports and subtrees can't have."""
 MAIN = "attempts"
 """The name of the whole tree, which makes attempts."""
@@ -89,15 +73,13 @@ class Tree:
     """The behaviour tree of a plan.
 
     An attempt ticks the subtree `first` once, and then the subtree `then` until it succeeds or fails. `subtrees` has all subtrees
-    by name. `leaves` has the condition or the primitive of each leaf, by the leaf's key. `possible` has the names of the leaves
-    that check the preconditions of a primitive.
+    by name. `leaves` has the condition or the primitive of each leaf, by the leaf's key.
     """
 
     first: str
     then: str
     subtrees: Mapping[str, Element]
     leaves: Mapping[str, Fact | Condition | Step]
-    possible: frozenset[str]
 
     def asks(self, key: str, situation: Situation) -> bool:
         """Return whether the condition of a leaf, or the preconditions of its primitive, hold in a situation."""
@@ -111,7 +93,7 @@ def behavior_tree(problem: Problem, plan: Plan) -> Tree:
     """Return the behaviour tree of a valid plan, with nodes that both BehaviorTree.CPP and py_trees support."""
     lowering = _ElementWriter(problem)
     first, then = (lowering.lowered(tree).name for tree in tree_of(problem, plan))
-    return Tree(first, then, lowering.subtrees, lowering.leaves, frozenset(lowering.possible))
+    return Tree(first, then, lowering.subtrees, lowering.leaves)
 
 
 def export_trees(problem: Problem, plan: Plan, folder: Path) -> tuple[Path, Path]:
@@ -133,8 +115,15 @@ class _ElementWriter:
         self.problem = problem
         self.subtrees: dict[str, Element] = {}
         self.leaves: dict[str, Fact | Condition | Step] = {}
-        self.possible: set[str] = set()
-        self.actions = {_free(_identifier(behavior), TREES) for behavior in problem.domain.behaviors}
+        behaviors, situations = problem.domain.behaviors, problem.domain.situations
+        wanted = [(("Action", one), _identifier(one)) for one in behaviors]
+        wanted += [(("possible", one), f"{_identifier(one)}_possible") for one in behaviors]
+        wanted += [(("Condition", ""), "Holds"), *((("Condition", one), _identifier(one)) for one in situations)]
+        self.names: dict[tuple[str, str], str] = {}
+        self.taken = {*TREES}
+        for key, name in wanted:
+            self.names[key] = _free(name, self.taken)
+            self.taken.add(self.names[key])
 
     def lowered(self, node: TreeNode) -> Element:
         """Return the element of a library for a node of the plan's behaviour tree."""
@@ -144,10 +133,10 @@ class _ElementWriter:
                 leaves = [self.leaf("Condition", *self.words(one), one) for one in (*facts, *conditions)]
                 return leaves[0] if len(leaves) == 1 else Element("Sequence", children=tuple(leaves))
             case Do(step):
-                name, ports = self.primitive(step)
-                self.possible.add(f"{name}_possible")
-                possible = self.leaf("Condition", f"{name}_possible", ports, step)
-                once = Element("Once", children=(possible, self.leaf("Action", name, ports, step)))
+                ports = self.ports(step)
+                possible = self.leaf("Condition", self.names["possible", step.behavior], ports, step)
+                action = self.leaf("Action", self.names["Action", step.behavior], ports, step)
+                once = Element("Once", children=(possible, action))
                 return Element("Sequence", children=(once, self.lowered(mark(step.path, 1)), Element("Again")))
             case Compared(variable, comparison, number):
                 return Element("Check", variable, ports={"comparison": comparison, "number": str(number)})
@@ -160,37 +149,39 @@ class _ElementWriter:
             case Together(nodes):
                 return Element("Parallel", children=tuple(map(self.lowered, nodes)))
             case Subtree(name, child):
-                own = _identifier(name)  # names can't have spaces in the libraries
+                own = _free(_identifier(name), self.taken - TREES)  # names can't have spaces in the libraries
                 self.subtrees[own] = Element("")  # the entry keeps the subtree before its nested subtrees
                 self.subtrees[own] = self.lowered(child)
                 return Element("SubTree", own)
 
     def leaf(self, kind: str, name: str, ports: Mapping[str, str], what: Fact | Condition | Step) -> Element:
         """Return a new leaf with a unique key."""
-        name = _free(name, TREES if isinstance(what, Step) else TREES | self.actions)
         key = f"{kind[0].lower()}{len(self.leaves)}"
         self.leaves[key] = what
         return Element(kind, name, ports=ports, key=key)
 
-    def primitive(self, step: Step) -> tuple[str, dict[str, str]]:
-        """Return the name of a primitive, and its arguments by the names of ports."""
-        parameters = self.problem.domain.behaviors[step.behavior].parameters
-        names = [_identifier(parameter.name.rpartition(".")[2]) for parameter in parameters]
-        return _identifier(step.behavior), dict(zip(names, step.arguments, strict=True))
+    def ports(self, step: Step) -> dict[str, str]:
+        """Return the arguments of a primitive by the names of ports."""
+        found: dict[str, str] = {}
+        for parameter, argument in zip(
+            self.problem.domain.behaviors[step.behavior].parameters, step.arguments, strict=True
+        ):
+            found[_free(_identifier(parameter.name.rpartition(".")[2]), found)] = argument
+        return found
 
     def words(self, one: Fact | Condition) -> tuple[str, dict[str, str]]:
         """Return the name and the ports of a condition. A condition other than a fact has one port with its text."""
         if not isinstance(one, Fact):
-            return "Holds", {"condition": said(one)}
+            return self.names["Condition", ""], {"condition": said(one)}
         arguments = {f"argument{number}": each for number, each in enumerate(one.symbol.arguments, 1)}
-        return _identifier(one.symbol.situation), {**arguments, "value": one.value}
+        return self.names["Condition", one.symbol.situation], {**arguments, "value": one.value}
 
 
 def _identifier(name: str) -> str:
-    """Return an identifier of letters, digits and underscores that isn't a reserved name of BehaviorTree.CPP or py_trees."""
+    """Return an identifier that begins with a letter and isn't a reserved name of BehaviorTree.CPP or py_trees."""
     found = re.sub(r"\W+", "_", name).strip("_")
-    found = f"_{found}" if found[:1].isdigit() else found
-    return f"{found}_" if found in RESERVED or keyword.iskeyword(found) else found
+    found = f"n{found}" if found[:1].isdigit() else found
+    return f"{found}_" if found in RESERVED.split() or keyword.iskeyword(found) else found
 
 
 def _free(name: str, taken: Collection[str]) -> str:

@@ -295,6 +295,39 @@ def test_a_leaf_never_has_the_name_of_a_subtree_or_of_another_kind_of_leaf(name:
     assert "plan" in tree.subtrees
 
 
+@pytest.mark.parametrize("name", ["Inverter", "Repeat", "Switch3", "SubTreePlus", "AsyncSequence", "TryCatch"])
+def test_a_leaf_never_has_the_name_of_a_node_of_an_engine(name: str) -> None:
+    assert name not in names_of({name: name})
+
+
+def test_different_facts_primitives_and_arguments_have_different_names() -> None:
+    both = {"A.B UP": "LIFT A.B", "A B.UP": "LIFT A B", "Holds": "A B UP"}
+    assert len(names_of(both)) == 3 * len(both)
+    assert len(names_of({"UP": "X", "X possible": "Y"})) == 6
+    parameters = (Parameter("?left.arm", "Tub"), Parameter("?right.arm", "Tub"))
+    lift = Behavior("lift", 1, parameters, (), (), (ValueEffect("UP", ("?left.arm",), TRUE),))
+    problem = replace(washing({"UP": TRUE}), domain=Domain(HELD_UP, {"lift": lift}), initial={})
+    problem = replace(problem, classes={"Tub": ("tub", "basin")})
+    tree = behavior_tree(problem, Plan((Step((0,), 0, 1, "lift", ("tub", "basin")),)))
+    leaves = [one for element in tree.subtrees.values() for one in every(element) if one.kind == "Action"]
+    assert [sorted(leaf.ports.values()) for leaf in leaves] == [["basin", "tub"]]
+
+
+HELD_UP = {"UP": SituationType("UP", ("Tub",), "Truth", boolean=True)}
+
+
+def names_of(givers: dict[str, str]) -> set[str]:
+    """Return the names of the leaves of a plan in which each situation type has a behaviour that makes it true."""
+    behaviors = {
+        name: Behavior(name, 1, (), (), (), (ValueEffect(fact, ("tub",), TRUE),)) for fact, name in givers.items()
+    }
+    situations = {fact: SituationType(fact, ("Tub",), "Truth", boolean=True) for fact in givers}
+    goal = dict.fromkeys(givers, TRUE)
+    problem = replace(washing(goal), domain=Domain(situations, behaviors), initial={})
+    tree = behavior_tree(problem, Plan(tuple(Step((i,), i, 1, name, ()) for i, name in enumerate(givers.values()))))
+    return {one.name for element in tree.subtrees.values() for one in every(element) if one.key}
+
+
 def every(element: Element) -> list[Element]:
     return [element, *(one for child in element.children for one in every(child))]
 
