@@ -89,8 +89,8 @@ def plan(
     engine : str, optional
         An external planner (engine) of unified-planning, e.g. ``fast-downward``. By default, an installed engine is tried if
         Confab's own search gives up and `leave_levels` is true. If an engine may be tried, Confab's own search must find a plan in
-        three fifths of the time limit. Without a time limit, the engine is tried after about twenty seconds of search; if it finds no
-        plan, the search starts again without a limit. With ``none``, no engine is tried.
+        three fifths of the time limit. Without a time limit, the engine is tried after about twenty seconds of search; if it finds
+        no plan, the search starts again without a limit. With ``none``, no engine is tried.
     level : int, optional
         The level on which the engine plans; by default the lowest level.
     leave_levels : bool

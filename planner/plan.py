@@ -403,12 +403,13 @@ class Limits:
     """Limits of a planning call.
 
     `seconds` limits the whole call, unless `seconds` is None. In the modes guarded, leading and strict, a first plan must be
-    found within the share `finding` of this time; the time after a first plan is for a shorter plan. In the paper's mode, `expansions` limits each search. In the
-    other modes, `expansions` limits the sum of all searches for single goals, and separately the final search for all goals
-    together. `work` limits searches in grounded levels and parts of levels until a plan is found. The unit of `work` is states
-    times operators, about a microsecond each. `shortening` is the work for a shorter plan. With "none", there is no round;
-    with "once", there is one round. With "brief", there is one round with little work, or no round if `seconds` is given. With
-    "repeated", rounds follow one another until the second half of them has saved nothing, or until `seconds` have passed.
+    found within the share `finding` of this time; the time after a first plan is for a shorter plan. In the paper's mode,
+    `expansions` limits each search. In the other modes, `expansions` limits the sum of all searches for single goals, and
+    separately the final search for all goals together. `work` limits searches in grounded levels and parts of levels until a plan
+    is found. The unit of `work` is states times operators, about a microsecond each. `shortening` is the work for a shorter plan.
+    With "none", there is no round; with "once", there is one round. With "brief", there is one round with little work, or no round
+    if `seconds` is given. With "repeated", rounds follow one another until the second half of them has saved nothing, or until
+    `seconds` have passed.
     Shortening keeps only plans that `accepts` allows.
     """
 

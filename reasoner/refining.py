@@ -7,7 +7,7 @@ from dataclasses import replace
 from fractions import Fraction
 
 from confab.reasoner.language import situations_of, walk
-from confab.reasoner.symbols import FALSE, AmountEffect, AnyOf, Behavior, Problem, ValueEffect
+from confab.reasoner.symbols import FALSE, NEVER, AmountEffect, Behavior, Problem, ValueEffect
 
 
 def never_done(problem: Problem) -> Iterator[tuple[Behavior, str]]:
@@ -51,7 +51,7 @@ def never_done(problem: Problem) -> Iterator[tuple[Behavior, str]]:
 
 def without(problem: Problem, behaviors: Sequence[Behavior]) -> Problem:
     """Return a problem in which some behaviours are never applicable; the IDs of all behaviours remain the same."""
-    never = {one.name: replace(one, preconditions=(*one.preconditions, AnyOf(()))) for one in behaviors}
+    never = {one.name: replace(one, preconditions=(*one.preconditions, NEVER)) for one in behaviors}
     return replace(problem, domain=replace(problem.domain, behaviors={**problem.domain.behaviors, **never}))
 
 

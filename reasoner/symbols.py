@@ -203,6 +203,10 @@ class AnyOf:
     constraint: Constraint | None = field(default=None, compare=False, repr=False)
 
 
+NEVER = AnyOf(())
+"""The condition that no state satisfies."""
+
+
 @dataclass(frozen=True)
 class Comparison:
     """A comparison of two numeric expressions by `operator` (a key of `amounts.COMPARING`).

@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
+from itertools import product
 
 from confab.reasoner.amounts import (
     COMPARING,
@@ -25,6 +26,7 @@ from confab.reasoner.amounts import (
 from confab.reasoner.language import walk
 from confab.reasoner.symbols import (
     FALSE,
+    NEVER,
     TRUE,
     AmountEffect,
     Behavior,
@@ -55,9 +57,10 @@ def projected(
 ) -> tuple[tuple[Condition, ...], tuple[Effect, ...]]:
     """Return the preconditions and effects of a behaviour that no other step overlaps.
 
-    A condition that earlier effects of the behaviour achieve is omitted; a condition on amounts that earlier effects change becomes
-    a condition on the amounts before the behaviour. An effect that a later effect overwrites is omitted. Increases, decreases and
-    factors overwrite nothing, and equal ones add up.
+    A condition that earlier effects of the behaviour achieve is omitted; a condition that they contradict becomes `NEVER`. A
+    condition on amounts that earlier effects change becomes a condition on the amounts before the behaviour, and so do the
+    calculations and conditions of effects. An effect that a later effect overwrites is omitted. Increases, decreases and factors
+    overwrite nothing, and equal ones add up; if an amount is increased or decreased before it is scaled, it is assigned the result.
     """
     spans = tuple(Span)
 
@@ -69,45 +72,73 @@ def projected(
             if (isinstance(e, ValueEffect) or e.operation == "assign") and not e.when and not e.each
         )
 
-    certain = {span: [e for its, e in effects if its is span and not e.when and not e.each] for span in spans}
-    asked = dict[Condition, None]()
-    for span, condition in conditions:
-        before = [certain[earlier] for earlier in reversed(spans[: spans.index(span)])]
+    made = {span: [e for its, e in effects if its is span] for span in spans}
+    amounts: dict[Span, dict[Amount, Expression]] = {}
+    now = dict[Amount, Expression]()
+    for span in spans:
+        amounts[span], now = now, _amounts_after(now, made[span])
+
+    def before(span: Span, condition: Condition) -> tuple[Condition, ...]:
+        earlier = [made[other] for other in reversed(spans[: spans.index(span)])]
         if isinstance(condition, ValueCondition):
-            asked |= dict.fromkeys(() if _achieved(condition, before) else (condition,))
-        elif isinstance(condition, Comparison):
-            asked |= dict.fromkeys(_compared_before(condition, before))
-        else:
-            asked[condition] = None
-    return tuple(asked), tuple(effect for span, effect in effects if not overwritten(span, effect))
+            decided = _decided(condition, earlier)
+            return (condition,) if decided is None else () if decided else (NEVER,)
+        return _compared_before(condition, amounts[span]) if isinstance(condition, Comparison) else (condition,)
+
+    changes = [(spans.index(at), e) for at, e in effects if isinstance(e, AmountEffect) and not e.when and not e.each]
+    mixed = {
+        Amount(one.situation, one.arguments): None
+        for (at, one), (later, other) in product(changes, changes)
+        if at < later and one.operation in ("increase", "decrease") and other.operation == "scale"
+        if (one.situation, one.arguments) == (other.situation, other.arguments)
+    }
+    asked = dict.fromkeys(one for span, condition in conditions for one in before(span, condition))
+    found = list[Effect]()
+    for span, effect in effects:
+        when = tuple(one for condition in effect.when for one in before(span, condition))
+        cell = Amount(effect.situation, effect.arguments)
+        if overwritten(span, effect) or NEVER in when or (cell in mixed and not effect.when and not effect.each):
+            continue
+        if isinstance(effect, AmountEffect):
+            effect = replace(effect, amount=with_amounts(effect.amount, amounts[span]))
+        found.append(replace(effect, when=when))
+    assigned = (AmountEffect(one.situation, one.arguments, "assign", now[one]) for one in mixed)
+    return tuple(asked), (*found, *assigned)
 
 
-def _achieved(condition: ValueCondition, effects: Iterable[Sequence[Effect]]) -> bool:
-    """Return whether effects achieve a condition; the latest effects come first."""
-    cell, wanted = (condition.situation, condition.arguments), condition.value
+def _amounts_after(now: Mapping[Amount, Expression], effects: Iterable[Effect]) -> dict[Amount, Expression]:
+    """Return the amounts after effects without conditions as expressions of the amounts at first, given those before."""
+    after = {**now}
+    amounts = [e for e in effects if isinstance(e, AmountEffect) and not e.when and not e.each]
+    for effect in sorted(amounts, key=lambda one: OPERATIONS.index(one.operation)):
+        cell = Amount(effect.situation, effect.arguments)
+        after[cell] = after_effect(after.get(cell, cell), effect.operation, with_amounts(effect.amount, now))
+    return after
+
+
+def _decided(condition: ValueCondition, effects: Iterable[Sequence[Effect]]) -> bool | None:
+    """Return whether effects achieve or contradict a condition, or None for neither; the latest effects come first."""
+    wanted, uncertain = condition.value, False
     for made in effects:
-        values = [e.value for e in made if isinstance(e, ValueEffect) and (e.situation, e.arguments) == cell]
-        if values:
-            unlike = any(value != wanted and "?" not in (value[0], wanted[0]) for value in values)
-            return unlike if condition.negated else wanted in values
-    return False
+        about = [e for e in made if isinstance(e, ValueEffect) and e.situation == condition.situation]
+        certain = [e for e in about if e.arguments == condition.arguments and not e.when and not e.each]
+        uncertain = uncertain or len(certain) < len(about)
+        if certain:
+            value = max((e.value for e in certain), key=lambda one: one != FALSE)  # the step's falsehoods come first
+            if value != wanted and "?" in (value[0], wanted[0]):
+                return None
+            holds = (value == wanted) is not condition.negated
+            return holds or (None if uncertain else False)
+    return None
 
 
-def _compared_before(condition: Comparison, effects: Iterable[Sequence[Effect]]) -> tuple[Condition, ...]:
-    """Return the conditions under which a comparison holds after effects; the latest effects come first."""
-    left, right, there = condition.left, condition.right, dict[Amount, None]()
-    for made in effects:
-        after = dict[Amount, Expression]()
-        amounts = [effect for effect in made if isinstance(effect, AmountEffect)]
-        for effect in sorted(amounts, key=lambda one: OPERATIONS.index(one.operation)):
-            cell = Amount(effect.situation, effect.arguments)
-            after[cell] = after_effect(after.get(cell, cell), effect.operation, effect.amount)
-        there |= dict.fromkeys(
-            part for one in (left, right) for part in inside(one) if isinstance(part, Amount) and part in after
-        )
-        left, right = with_amounts(left, after), with_amounts(right, after)
+def _compared_before(condition: Comparison, amounts: Mapping[Amount, Expression]) -> tuple[Condition, ...]:
+    """Return the conditions under which a comparison holds, given the changed amounts as expressions of the amounts before."""
+    parts = (part for one in (condition.left, condition.right) for part in inside(one))
+    there = dict.fromkeys(part for part in parts if isinstance(part, Amount) and part in amounts)
     if not there:
         return (condition,)
+    left, right = with_amounts(condition.left, amounts), with_amounts(condition.right, amounts)
     found: list[Condition] = [Comparison(cell, "=", cell) for cell in there]  # no effect changes a missing amount
     holds = COMPARING[condition.operator]
     if not (isinstance(left, Fraction) and isinstance(right, Fraction) and holds(left, right) is not condition.negated):

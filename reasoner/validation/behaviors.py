@@ -235,7 +235,7 @@ def _possible(condition: Condition, behavior: Behavior, problem: Problem, there:
             return not values or any((situation, v) in there for v in values)
         case Witness(_, _, inner, False):
             return all(_possible(c, behavior, problem, there) for c in inner)
-        case AnyOf(alternatives, False):
+        case AnyOf(alternatives, False) if alternatives:
             return any(all(_possible(c, behavior, problem, there) for c in group) for group in alternatives)
         case _:
             return True

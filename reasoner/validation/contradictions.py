@@ -12,6 +12,7 @@ from confab.reasoner.possible import against_physics
 from confab.reasoner.sentences import plain
 from confab.reasoner.symbols import (
     FALSE,
+    NEVER,
     TRUE,
     AnyOf,
     Behavior,
@@ -21,9 +22,11 @@ from confab.reasoner.symbols import (
     EqualityCondition,
     Problem,
     RelationCondition,
+    Span,
     ValueCondition,
     Witness,
 )
+from confab.reasoner.timing import judged_by_events, projected, timing_of
 from confab.reasoner.validation.case import Fault, ReadCase
 from confab.reasoner.validation.definitions import both
 
@@ -50,13 +53,32 @@ def contradictions(case: ReadCase) -> Iterator[Fault]:
                 f"no state satisfies both, so {'the effect never happens' if where else consequence}",
                 "remove one of the two conditions, or correct its terms",
             )
+    for name, behavior in problem.domain.behaviors.items():
+        for condition in _undone(behavior, problem):
+            yield (
+                names.iri(name),
+                f"{name} requires {plain(condition)} after its own effect makes this false",
+                "the behaviour is never applicable",
+                "remove the condition or the effect, or correct its c:during",
+            )
 
 
 def dead(problem: Problem) -> frozenset[str]:
     """Return the behaviours with contradictory preconditions."""
     return frozenset(
-        name for name, b in problem.domain.behaviors.items() if any(not where for _, where in _clashes(b, problem))
+        name
+        for name, b in problem.domain.behaviors.items()
+        if any(not where for _, where in _clashes(b, problem)) or any(_undone(b, problem))
     )
+
+
+def _undone(behavior: Behavior, problem: Problem) -> Iterator[Condition]:
+    """Yield the conditions that an earlier effect of the same behaviour makes false, and that no other step may make true again."""
+    timing, others_may = timing_of(behavior), judged_by_events(problem)
+    for span, condition in timing.conditions:
+        made = [one for one in timing.effects if not (others_may and span is Span.END and one[0] is Span.START)]
+        if NEVER in projected([(span, condition)], made)[0]:
+            yield condition
 
 
 def _clashes(behavior: Behavior, problem: Problem) -> Iterator[tuple[Clash, str]]:

@@ -28,6 +28,7 @@ from confab.reasoner.symbols import (
     Problem,
     SituationType,
     Span,
+    Symbol,
     Timing,
     ValueEffect,
 )
@@ -252,6 +253,48 @@ def test_what_a_step_takes_again_before_its_end_isnt_given() -> None:
     made = ((Span.START, becomes("P", "?t", TRUE)), (Span.THROUGHOUT, becomes("P", "?t", FALSE)), AFTER)
     for level in (1, 2):
         assert solve(Request(spanned(level, asked, made, "G"), limits=Limits(seconds=10.0))).plan is None
+
+
+N = Amount("N", ("?t",))
+TWO_MORE = (Span.START, AmountEffect("N", ("?t",), "increase", Fraction(2)))
+OWN: dict[str, tuple[Effect, dict[str, str]]] = {
+    "scaled": (AmountEffect("N", ("?t",), "scale", Fraction(3)), {"N": "6"}),
+    "doubled by a calculation": (AmountEffect("N", ("?t",), "increase", N), {"N": "4"}),
+    "compared": (ValueEffect("P", ("?t",), TRUE, (Comparison(N, ">=", Fraction(2)),)), {"N": "2", "P": TRUE}),
+}
+
+
+@pytest.mark.parametrize("name", OWN)
+@pytest.mark.parametrize("level", [1, 2])
+def test_an_effect_at_the_end_of_a_step_finds_the_amounts_that_its_begin_has_changed(name: str, level: int) -> None:
+    effect, after = OWN[name]
+    made = (TWO_MORE, (Span.END, effect), AFTER)
+    problem = spanned(level, (), made, "G")
+    problem = replace(problem, goal={**problem.goal, **{Symbol(one, ("t",)): value for one, value in after.items()}})
+    outcome = solve(Request(problem, limits=Limits(seconds=20.0)))
+    assert outcome.plan is not None
+    assert len(outcome.plan.primitives) == 1
+    assert validate_in_sequence(problem, outcome.plan) == []
+
+
+@pytest.mark.parametrize("span", [Span.THROUGHOUT, Span.END])
+@pytest.mark.parametrize("level", [1, 2])
+def test_a_step_whose_begin_makes_its_own_condition_false_is_in_no_plan(span: Span, level: int) -> None:
+    made = ((Span.START, becomes("P", "?t", TRUE)), AFTER)
+    problem = spanned(level, ((span, has("P", "?t", FALSE)),), made, "G")
+    assert solve(Request(problem, limits=Limits(seconds=10.0))).status is Status.UNSOLVABLE
+
+
+def test_validation_reports_a_step_whose_begin_makes_its_own_condition_false(tmp_path: Path) -> None:
+    below = ":HOLD a owl:NamedIndividual, c:Behavior ; c:level 2 ; c:index 1 ."
+    for span, more, never in (("throughout", "", True), ("atEnd", "", False), ("atEnd", below, True)):
+        condition = "c:situationType :{} ; c:about :PRESS.jar ; c:during c:{}"
+        text = JARS.replace(condition.format("SCREWED", "atEnd"), condition.format("LOOSE", span))
+        assert text != JARS
+        (tmp_path / "jars.ttl").write_text(text + more, encoding="utf-8")
+        said = [str(one) for one in confab.validate(tmp_path / "jars.ttl")]
+        assert any("after its own effect" in one for one in said) == never, said
+        assert never or not any("never applicable" in one for one in said), said
 
 
 def test_a_goal_isnt_reached_by_a_step_that_never_ends() -> None:
