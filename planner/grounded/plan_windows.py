@@ -6,10 +6,10 @@ window. An operator is near if few steps lead from the start of the window to th
 the end of the window. The search is A* with h_FF (`confab.planner.grounded.shortest`). A state is dropped if, according to h,
 no cheaper plan leads through the state.
 
-First, the order of all steps may change (`confab.planner.grounded.routes`). Windows of steps are tried on the resulting plan and on
-a regrouped plan, in which each step follows a step on which it depends. The given order is kept if the other order saves nothing.
-Finally, the remaining work is spent on the whole plan as one window, with all operators and a greater weight of h. Of two equally
-cheap plans, the plan with fewer steps counts as cheaper (`TRIFLE`).
+First, the order of all steps may change (`confab.planner.grounded.routes`). Windows of steps are tried on the resulting plan and
+on a regrouped plan, in which each step follows a step on which it depends. The given order is kept if the other order saves
+nothing. Finally, the remaining work is spent on the whole plan as one window, with all operators: first with a greater weight of
+h, then with a lower bound. Of two equally cheap plans, the plan with fewer steps counts as cheaper (`TRIFLE`).
 
 Work is counted in examined operators instead of seconds. Therefore the result is the same on every machine.
 
@@ -20,6 +20,7 @@ Action elimination (`shortened`) is described by Nakhost and Müller, "Action el
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
@@ -34,7 +35,7 @@ from confab.planner.grounded.amounts import Amounts, Linear
 from confab.planner.grounded.hff import cost_left
 from confab.planner.grounded.joins import Ints
 from confab.planner.grounded.routes import rerouted
-from confab.planner.grounded.shortest import shortest, ways
+from confab.planner.grounded.shortest import LowerBound, shortest, ways
 from confab.planner.grounded.task import BitChange, Grouped, Task, bits_of
 from confab.planner.plan_costs import TRIFLE
 
@@ -53,6 +54,8 @@ WEIGHT = 3
 """Weight of h_FF when the whole plan is searched again with all operators."""
 REMAINING = 4
 """Divisor of the work that remains for windows if another route made the plan cheaper."""
+RANKED = 20
+"""Work of ranking a state by the lower bound."""
 TRIALS = 2_000_000
 """Maximum number of replayed operators when superfluous steps are removed."""
 LOOK, BITS = 50, 400
@@ -291,7 +294,7 @@ class _Windows:
         operators = self.near(steps, state, wanted)
         self.work -= len(operators) * self.task.size // BITS
         task, operators = self.part(operators, state, wanted)
-        found = self.search(task, spent, self.most)
+        found = self.search(task, spent, self.most, cost_left(task), len(task.owners), cut=self.cut)
         return None if found is None else [operators[operator] for operator in found]
 
     def restarted(self, plan: list[int]) -> list[int]:
@@ -299,17 +302,26 @@ class _Windows:
 
         The work must suffice for the successors of as many states as the plan has steps.
         """
-        following = 1 + self.task.derived.effort // WAYS
-        most = self.work // (max(len(self.task.owners), 1) * following)
-        if most < len(plan) * len(self.task.applicable(self.task.initial)[0]):
-            return plan
-        found = self.search(self.task, self.task.cost_of(plan), most, WEIGHT)
-        return plan if found is None else shortened(self.task, found, self.deadline)
+        task, best, all_ = self.task, plan, max(len(self.task.owners), 1)
+        following = 1 + task.derived.effort // WAYS
+        for bound, each, weight, cut in (cost_left(task), all_, WEIGHT, self.cut), (ways(task), RANKED, 1, 1.0):
+            most = self.work // (all_ * following)
+            if self.over or most < len(plan) * len(task.applicable(task.initial)[0]):
+                break
+            with suppress(MemoryError):
+                found = self.search(task, task.cost_of(best), self.work // (each * following), bound, each, weight, cut)
+                best = best if found is None else shortened(task, found, self.deadline)
+        return best
 
-    def search(self, task: Task, upper: float, most: int, weight: int = 1) -> list[int] | None:
-        """Search for a plan cheaper than `upper` by A*; drop states whose cost plus weighted h_FF reaches `upper`."""
-        found = shortest(task, cost_left(task), upper, deadline=self.deadline, known=most, weight=weight, cut=self.cut)
-        self.work -= len(found.states) * len(task.owners)
+    def search(
+        self, task: Task, upper: float, most: int, bound: LowerBound, each: int, weight: int = 1, cut: float = 1.0
+    ) -> list[int] | None:
+        """Search for a plan cheaper than `upper` by A*, with the work `each` for a state.
+
+        States whose cost plus `cut` times the estimate reaches `upper` are dropped.
+        """
+        found = shortest(task, bound, upper, deadline=self.deadline, known=most, weight=weight, cut=cut)
+        self.work -= len(found.states) * each
         return None if found.plan is None else list(found.plan)
 
     @cached_property

@@ -64,18 +64,17 @@ def shortened(call: Call, improve: int, leave_levels: bool, advised: Callable[[C
 def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Call], None]) -> None:
     """Shorten the steps of a call in rounds, each with twice the work of the round before.
 
-    By default, there is one round. With repeated shortening, if round n was the last round that made the plan cheaper, there are at
-    most 2 n rounds. If other steps of the lowest level can make refinements cheaper, repeated shortening has at least
-    `LEAST_ROUNDS` rounds. A brief call has one round with little work, or no round if the call has a time limit.
+    By default, there is one round. Repeated shortening has at least `LEAST_ROUNDS` rounds; if round n was the last round that made
+    the plan cheaper, there are at most 2 n rounds. A brief call has one round with little work, or no round if the call has a time
+    limit.
     """
-    least = LEAST_ROUNDS if costs_depend(call) else 1
     if prices(call) > 1 and call.bound is None:
         call.bound = lower_bound(call)
     improve = 1 if call.space.shortening == "brief" else improve
     work, random = max(call.space.effort, LEAST_EFFORT) * improve // (2 * ORDERS), Random(0)
     rounds = useful = 0
     most = {"none": 0, "brief": int(call.space.deadline is None), "once": 1, "repeated": inf}[call.space.shortening]
-    while rounds < min(most, max(least, 2 * useful)):
+    while rounds < min(most, max(LEAST_ROUNDS, 2 * useful)):
         before, begin = cost(call), perf_counter()
         shorten_once(call, work, leave_levels, advised, random)
         rounds, work, saved = rounds + 1, 2 * work, before - cost(call)

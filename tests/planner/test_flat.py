@@ -11,6 +11,7 @@ from time import process_time
 import numpy as np
 import pytest
 
+import confab
 from confab.planner.grounded import reachability
 from confab.planner.grounded.best_first import Search, plan_level, search
 from confab.planner.grounded.exploring import SearchOrder, explore, path_to
@@ -240,6 +241,14 @@ def test_windows_shorten_a_plan_that_still_achieves_the_goal() -> None:
         state = task.applied(state, operator)
     assert state is not None and state & task.goal == task.goal
     assert shorter(task, first, work=0) == shortened(task, first)
+
+
+def test_remaining_work_is_spent_on_the_whole_plan_until_no_plan_is_cheaper() -> None:
+    problem = confab.load("tour-large").problem
+    task, first = ground(problem, 1, goal=problem.goal_on(1)), list[int]()
+    assert isinstance(task, Task)
+    search(task, found=first.extend)
+    assert len(shorter(task, first, work=5_000_000)) == 17 < len(first)  # --optimal proves 17
 
 
 def test_several_steps_with_the_effect_of_one_step_are_replaced_by_it() -> None:
