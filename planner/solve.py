@@ -135,8 +135,13 @@ def _overlapping(request: Request, deadline: Deadline) -> Outcome:
     if not only_during(problem):
         seconds = None if deadline.left is None else IN_SEQUENCE * deadline.left
         outcome = MODES[request.mode](replace(request, limits=replace(request.limits, seconds=seconds)))
-        if outcome.plan is not None and not (by_need and validate_in_sequence(problem, outcome.plan)):
-            return replace(outcome, bound=None) if by_need else outcome  # overlapping steps may cost less
+        if outcome.plan is not None:
+            with overtime():
+                faults = validate_in_sequence(problem, outcome.plan)
+            if not faults:
+                return replace(outcome, bound=None) if by_need else outcome  # overlapping steps may cost less
+            reason = Reason(f"the steps of the found plan can't be executed one after another: {faults[0].text}")
+            outcome = replace(outcome, status=Status.GAVE_UP, plan=None, reason=reason, left=(), forgone=(), cost=None)
     proof = _last_proof(problem, deadline)
     if proof is not None:
         return replace(outcome, status=Status.UNSOLVABLE, plan=None, reason=proof.reason, certificate=proof.certificate)

@@ -57,7 +57,7 @@ def projected(
 ) -> tuple[tuple[Condition, ...], tuple[Effect, ...]]:
     """Return the preconditions and effects of a behaviour that no other step overlaps.
 
-    A condition that earlier effects of the behaviour achieve is omitted; a condition that they contradict becomes `NEVER`. A
+    A condition that earlier effects of the behaviour achieve is omitted; `NEVER` follows a condition that they contradict. A
     condition on amounts that earlier effects change becomes a condition on the amounts before the behaviour, and so do the
     calculations and conditions of effects. An effect that a later effect overwrites is omitted. Increases, decreases and factors
     overwrite nothing, and equal ones add up; if an amount is increased or decreased before it is scaled, it is assigned the result.
@@ -82,7 +82,7 @@ def projected(
         earlier = [made[other] for other in reversed(spans[: spans.index(span)])]
         if isinstance(condition, ValueCondition):
             decided = _decided(condition, earlier)
-            return (condition,) if decided is None else () if decided else (NEVER,)
+            return (condition,) if decided is None else () if decided else (condition, NEVER)
         return _compared_before(condition, amounts[span]) if isinstance(condition, Comparison) else (condition,)
 
     changes = [(spans.index(at), e) for at, e in effects if isinstance(e, AmountEffect) and not e.when and not e.each]
@@ -97,7 +97,7 @@ def projected(
     for span, effect in effects:
         when = tuple(one for condition in effect.when for one in before(span, condition))
         cell = Amount(effect.situation, effect.arguments)
-        if overwritten(span, effect) or NEVER in when or (cell in mixed and not effect.when and not effect.each):
+        if overwritten(span, effect) or (cell in mixed and not effect.when and not effect.each):
             continue
         if isinstance(effect, AmountEffect):
             effect = replace(effect, amount=with_amounts(effect.amount, amounts[span]))

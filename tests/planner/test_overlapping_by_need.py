@@ -277,12 +277,36 @@ def test_an_effect_at_the_end_of_a_step_finds_the_amounts_that_its_begin_has_cha
     assert validate_in_sequence(problem, outcome.plan) == []
 
 
+@pytest.mark.parametrize("level", [1, 2])
+def test_a_plan_whose_steps_have_other_effects_in_time_is_not_returned(level: int) -> None:
+    tripled = (Span.END, AmountEffect("N", ("?t",), "scale", Fraction(3), (has("P", "?t", FALSE),)))
+    problem = spanned(level, (), (TWO_MORE, tripled, AFTER), "G")
+    for value in ("2", "6"):  # it is 6 in time; 2 if the factor came first
+        task = replace(problem, goal={**problem.goal, Symbol("N", ("t",)): value})
+        outcome = solve(Request(task, limits=Limits(seconds=5.0)))
+        assert (outcome.status is Status.SOLVED) == (outcome.plan is not None)
+        assert outcome.plan is None or (value == "6" and validate_in_sequence(task, outcome.plan) == [])
+
+
 @pytest.mark.parametrize("span", [Span.THROUGHOUT, Span.END])
 @pytest.mark.parametrize("level", [1, 2])
 def test_a_step_whose_begin_makes_its_own_condition_false_is_in_no_plan(span: Span, level: int) -> None:
     made = ((Span.START, becomes("P", "?t", TRUE)), AFTER)
     problem = spanned(level, ((span, has("P", "?t", FALSE)),), made, "G")
     assert solve(Request(problem, limits=Limits(seconds=10.0))).status is Status.UNSOLVABLE
+    never = (Span.END, ValueEffect("G", ("?t",), TRUE, (has("P", "?t", FALSE),)))
+    problem = spanned(level, (), (made[0], never), "G")
+    assert solve(Request(problem, limits=Limits(seconds=10.0))).status is Status.UNSOLVABLE
+
+
+def test_another_step_makes_a_condition_true_again_that_a_step_makes_false_itself(tmp_path: Path) -> None:
+    condition = "c:situationType :{} ; c:about :PRESS.jar ; c:during c:atEnd"
+    text = JARS.replace(condition.format("SCREWED"), condition.format("LOOSE")) + SECOND
+    effect = ":SCREW.screwed a owl:NamedIndividual, c:ValueEffect ; c:situationType "
+    (tmp_path / "jars.ttl").write_text(text.replace(f"{effect}:SCREWED", f"{effect}:LOOSE"), encoding="utf-8")
+    timed = schedule_of(confab.load(tmp_path / "jars.ttl").plan("jar CLOSED true", time_limit=20).outcome)
+    assert timed is not None
+    assert [slot.step.behavior for slot in timed.slots] == ["PRESS", "SCREW"]
 
 
 def test_validation_reports_a_step_whose_begin_makes_its_own_condition_false(tmp_path: Path) -> None:
