@@ -46,7 +46,8 @@ class Individuals:
         self.triples: dict[Triple, None] = {}
         self.seen: set[str] = set()
         values = (prop for node in schema.nodes.values() for prop in node.get(CORE + "valueProperty", ()))
-        self.links = {*PLACES, *values, *schema.nodes}  # properties of facts
+        of_facts = (CORE + "situationType", CORE + "relation")
+        self.links = {*PLACES, *of_facts, *values, *schema.nodes}  # properties of facts
 
     def visit(
         self, individuals: set[str], back: Mapping[str, set[str]] | None = None, classes: Iterable[str] = ()
@@ -79,7 +80,7 @@ class Individuals:
                 rows.append(stated((s, p, o), numbers))
                 continue
             if not names and said in links and subject not in nodes:
-                link((s, p, o))  # this call raises an error for the triple
+                link((s, p, o), blank=isinstance(o, ox.Literal) and said.startswith(CORE))  # raises an error
             if names or (isinstance(o, ox.Literal) and said != TYPE):
                 of = rows if isinstance(s, ox.NamedNode) else unnamed.setdefault(subject, [])
                 of.append((subject, said, text(o)))

@@ -43,7 +43,8 @@ SELECT DISTINCT ?individual ?class ?index WHERE {
 FACTS = """
 SELECT DISTINCT ?subject ?property ?object WHERE {
   { SELECT DISTINCT ?property {
-      { ?situation :valueProperty ?property } UNION { ?property a/rdfs:subClassOf* :Relation } } }
+      { ?situation :valueProperty ?property } UNION { ?property a/rdfs:subClassOf* :Relation }
+      UNION { ?property a :SituationType } } }
   ?subject ?property ?object .
 }"""
 """The query has an inner query, because a store would otherwise join its properties with all triples."""
@@ -84,7 +85,9 @@ def read(graph: KnowledgeGraph, schema: OntologySchema | None = None) -> Reading
     """
     members = members_of(graph)
     schema = read_schema(graph) if schema is None else schema
-    facts = [stated(row, schema.numbers) for row in graph.select(FACTS, SCENE)]
+    rows = [stated(row, schema.numbers) for row in graph.select(FACTS, SCENE)]
+    types = {*schema.of_kind("SituationType")} - schema.value_properties.keys()
+    facts = [row for row in rows if row[1] not in types]  # a situation type isn't a property
     tuples = nodes_of(core_triple(row) for row in graph.select(TUPLES, SCENE))
     known = frame(schema, members)
     check("reading the scene")

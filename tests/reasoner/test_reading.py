@@ -64,6 +64,26 @@ def test_a_situation_that_rests_true_is_true_of_an_object_without_a_fact_in_ever
     assert [f for f in off.with_fact("r PLUGGED true").facts if "PLUGGED" in f] == ["r PLUGGED true"]
 
 
+@pytest.mark.parametrize(
+    "fact",
+    [
+        ':r :PLUGGED "true" .',
+        ':r.fact a c:SituatedObjectInstance ; c:about :r ; c:situationType "PLUGGED" .',
+        '[] a c:SituatedObjectInstance ; c:about :r ; c:situationType :PLUGGED ; c:value "true" .',
+    ],
+)
+def test_every_mode_refuses_a_text_in_the_place_of_an_individual_in_the_same_words(fact: str, tmp_path: Path) -> None:
+    (tmp_path / "reefers.ttl").write_text(REEFERS + fact)
+    said = set()
+    for mode in ("guarded", "optimal", "paper"):
+        with pytest.raises(
+            KnowledgeError, match=r"the text '(true|PLUGGED)' as its value; name an individual"
+        ) as error:
+            confab.load(tmp_path / "reefers.ttl").plan(mode=mode)
+        said.add(str(error.value))
+    assert len(said) == 1
+
+
 @pytest.mark.parametrize("node", [":s.off a owl:NamedIndividual,", "[] a"])
 def test_a_stated_fact_is_read_by_every_mode_whether_its_node_has_a_name_or_not(node: str, tmp_path: Path) -> None:
     (tmp_path / "reefers.ttl").write_text(REEFERS.replace(":s.off a owl:NamedIndividual,", node))
