@@ -304,12 +304,13 @@ class _Windows:
         """
         task, best, all_ = self.task, plan, max(len(self.task.owners), 1)
         following = 1 + task.derived.effort // WAYS
-        for bound, each, weight, cut in (cost_left(task), all_, WEIGHT, self.cut), (ways(task), RANKED, 1, 1.0):
+        for bound, each, weight, cut in (cost_left, all_, WEIGHT, self.cut), (ways, RANKED, 1, 1.0):
             most = self.work // (all_ * following)
             if self.over or most < len(plan) * len(task.applicable(task.initial)[0]):
                 break
             with suppress(MemoryError):
-                found = self.search(task, task.cost_of(best), self.work // (each * following), bound, each, weight, cut)
+                known = self.work // (each * following)
+                found = self.search(task, task.cost_of(best), known, bound(task), each, weight, cut)
                 best = best if found is None else shortened(task, found, self.deadline)
         return best
 
