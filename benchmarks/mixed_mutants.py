@@ -340,13 +340,13 @@ def proofs(judge: judging.Judge, read: Scene, modes: str) -> Callable[[], None]:
     """Return the check of the proofs, and of planning in some modes, in a world."""
     problem, options = read.reading.problem, {"guarded": {}, "paper": {"mode": "paper"}, "optimal": {"mode": "optimal"}}
     kinds = () if "guarded" in modes else ("all", *judging.KINDS)
-    usual = {kind: [judge.call(kind, partial(judging.certificate, kind, problem))] for kind in kinds}
+    usual = {kind: judge.call(kind, partial(judging.certificate, kind, problem)) for kind in kinds}
 
     def run() -> None:
         for mode in options.keys() & modes.split():
             judge.outcome(read, mode, **options[mode])
         for kind, known in usual.items():
-            judge.call(f"proofs by {kind}", partial(judge.proof, problem, kind, known))
+            judge.proofs_of(problem, kind, known)
         judge.call("proofs by a search", lambda: judge.searched(problem))
 
     return run

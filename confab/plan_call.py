@@ -54,7 +54,8 @@ if TYPE_CHECKING:
 OURS = 0.6
 """The share of the time limit in which Confab's own search must find a plan if an engine may follow.
 
-The same share is for optimal planning before a schedule.
+If an engine may follow, a search before a schedule, or in the modes optimal and paper, ends after this share. An optimal search
+before a schedule always ends after this share, since the time left is for the schedule.
 """
 OURS_WORK = 10_000_000
 """Maximum work of Confab's own search (states times operators) before an engine is tried, if there is no time limit.
@@ -363,11 +364,11 @@ def own_request(task: PlanningTask, problem: Problem, how: Searching, engines: b
     if seconds is not None:
         from confab.engines import some_installed
 
-        then = engines and some_installed(problem)
-        if then and not timed and how.mode not in {"optimal", "paper"}:
+        share, before_engine = how.share, engines and some_installed(problem)
+        if how.mode in {"optimal", "paper"} or timed:
+            share *= OURS if before_engine or (timed and how.mode == "optimal") else 1.0
+        elif before_engine:
             finding = OURS
-        more = then or (timed and how.mode == "optimal")
-        share = how.share * (OURS if more and finding == 1.0 else 1.0)
         seconds = min(seconds * share, max(seconds - task.checking, seconds / 2))
     once = seconds is None or timed
     shortening = how.shortening or ("once" if once else "repeated")

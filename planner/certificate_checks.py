@@ -463,7 +463,8 @@ class Cases:
             goals = {
                 fact
                 for fact in self.certificate.unmet
-                if (fact.symbol.situation, fact.value) == violation
+                if fact.symbol in self.problem.goal
+                and (fact.symbol.situation, fact.value) == violation
                 and self.lowest.exists(fact.symbol.situation, fact.symbol.arguments)
             }
             found = Range(max(found.low, len(goals)), found.high)

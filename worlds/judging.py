@@ -34,7 +34,7 @@ from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
 from confab.reasoner.language import DomainError
 from confab.reasoner.limits import LimitError
 from confab.reasoner.reading import relevance
-from confab.reasoner.reading.problem import read_names
+from confab.reasoner.reading.problem import Reading, read_names
 from confab.reasoner.symbols import FALSE, Problem, Symbol
 from confab.scene import Scene, load
 from worlds.corrupted import corrupted, numbered, random_steps
@@ -247,6 +247,18 @@ class Judge:
             self.found.seconds[mode] = process_time() - begin
         return None
 
+    def compared(self, mode: str, made: Callable[[], object]) -> None:
+        """Make a comparison; a long comparison is a remark, since an exhaustive search takes most of the time."""
+
+        def limited_comparison() -> None:
+            try:
+                with limited(COMPARING):
+                    made()
+            except EndlessError:
+                self.found.remarks.append(Complaint("not compared", mode, ""))
+
+        self.call(mode, limited_comparison, 2 * COMPARING)
+
     def modes(self, file: Path) -> None:
         """Plan in every selected mode, and run the checks that depend on a plan."""
         read = self.call("load", lambda: load(file))
@@ -279,7 +291,7 @@ class Judge:
             plans = [outcome.plan for outcome in results.values() if outcome is not None and outcome.plan is not None]
             self.call("checker", lambda: self.checker(read.reading.problem, plans))
         if self.sampled(CERTIFICATES, "certificates", "certificates"):
-            self.call("certificates", lambda: self.false_certificates(read))
+            self.compared("certificates", lambda: self.false_certificates(read))
         if self.sampled(CERTIFICATES, "proofs", "certificates", "proofs"):
             self.proofs(read)
         if self.sampled(STEPS, "steps", "steps"):
@@ -461,16 +473,13 @@ class Judge:
     def recognition(self, mode: str, slices: Callable[[], Iterable[Slice]]) -> None:
         """Compare parts of scenes that task recognition selects with the whole scenes; a long comparison is a remark."""
         for one in self.call(mode, lambda: list(slices()), COMPARING) or ():
-            part = self.call(mode, one.part)
-            try:
-                with limited(COMPARING):
-                    said = "" if part is None else one.wrong(part)
-            except EndlessError:
-                self.found.remarks.append(Complaint("not compared", mode, ""))
-            else:
-                if said:
-                    text = f"{one.goals}, {one.queries} queries: {said}"
-                    self.complain("the part of the scene differs", "recognition", text)
+            if part := self.call(mode, one.part):
+                self.compared(mode, partial(self.part, one, part))
+
+    def part(self, one: Slice, part: Reading) -> None:
+        """Compare a part of a scene with the whole scene."""
+        if said := one.wrong(part):
+            self.complain("the part of the scene differs", "recognition", f"{one.goals}, {one.queries} queries: {said}")
 
     def slices(self, read: Scene) -> Iterator[Slice]:
         """Yield the comparisons of task recognition with the whole scene, for the task and for another goal."""
@@ -542,16 +551,21 @@ class Judge:
         remark. The checker must reject certificates that have lost a claim or have a false one.
         """
         for kind in ("all", *KINDS):
-            self.call(f"proofs by {kind}", partial(self.proof, read.reading.problem, kind))
+            self.proofs_of(read.reading.problem, kind)
         self.call("proofs by a search", lambda: self.searched(read.reading.problem))
 
-    def proof(self, problem: Problem, kind: str, known: Sequence[Certificate | None] = ()) -> None:
-        """Judge the certificate of one kind, unless it is one of the known certificates."""
+    def proofs_of(self, problem: Problem, kind: str, known: Certificate | None = None) -> None:
+        """Search for a certificate of one kind, and judge it unless it is the known certificate."""
+        mode = f"proofs by {kind}"
+        one = self.call(mode, partial(certificate, kind, problem))
+        if mode not in self.found.status and (one is None or one != known):
+            self.compared(mode, partial(self.proof, problem, mode, one))
+
+    def proof(self, problem: Problem, mode: str, one: Certificate | None) -> None:
+        """Judge a certificate of one kind, or that there is none."""
         from confab.planner.certificate_checks import refusal
 
-        one, found, mode = certificate(kind, problem), self.found, f"proofs by {kind}"
-        if one in known:
-            return
+        found = self.found
         if one is None:
             if found.known and found.least is None:
                 found.remarks.append(Complaint("no certificate", mode, ""))
@@ -709,12 +723,11 @@ class Judge:
         if (episode.status is End.REACHED) and not reached:
             self.complain("said to be reached, and isn't", mode, texts)
         if episode.status is End.IMPOSSIBLE:
-            self.meant.initial = tuple(state)
-            try:
+            initial, self.meant.initial = self.meant.initial, tuple(state)
+            with suppress(TooManyStatesError):
                 if self.meant.explored(self.world.problem.domain.levels[-1], MOST).least is not None:
                     self.complain("said to be impossible, and isn't", mode, texts)
-            except TooManyStatesError:
-                pass
+            self.meant.initial = initial
         if episode.status is End.GAVE_UP:
             self.found.remarks.append(Complaint("gave-up", mode, "; ".join(r.text for r in episode.reasons)))
 

@@ -125,15 +125,17 @@ class Advisor:
     def _fits(self, method: Method, using: Compiled) -> bool:
         """Return whether a domain has all behaviours, classes and situation types of a method, with the same numbers of arguments.
 
-        The number of parameters and variables of the method's behaviour must equal the number of the method's roles.
+        The number of parameters and variables of the method's behaviour must equal the number of the method's roles. The steps must
+        be of the next level.
         """
-        behaviors = using.program.domain.behaviors
+        behaviors, levels = using.program.domain.behaviors, using.program.levels
         own = behaviors.get(method.behavior)
         if own is None or len(own.parameters) + len(using.program.variables[method.behavior]) != method.roles:
             return False
-        situations = using.program.domain.situations
+        situations, below = using.program.domain.situations, [level for level in levels if level > own.level][:1]
         return all(
-            name in behaviors and len(behaviors[name].parameters) == len(places) for name, places in method.steps
+            name in behaviors and [behaviors[name].level] == below and len(behaviors[name].parameters) == len(places)
+            for name, places in method.steps
         ) and all(
             role.kind in using.program.problem.classes
             and (role.source is None or role.source[0] in situations)

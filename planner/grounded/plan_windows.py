@@ -302,10 +302,10 @@ class _Windows:
 
         The work must suffice for the successors of as many states as the plan has steps.
         """
-        task, best, all_ = self.task, plan, max(len(self.task.owners), 1)
+        task, best, operators = self.task, plan, max(len(self.task.owners), 1)
         following = 1 + task.derived.effort // WAYS
-        for bound, each, weight, cut in (cost_left, all_, WEIGHT, self.cut), (ways, RANKED, 1, 1.0):
-            most = self.work // (all_ * following)
+        for bound, each, weight, cut in (cost_left, operators, WEIGHT, self.cut), (ways, RANKED, 1, 1.0):
+            most = self.work // (operators * following)
             if self.over or most < len(plan) * len(task.applicable(task.initial)[0]):
                 break
             with suppress(MemoryError):

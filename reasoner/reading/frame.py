@@ -143,8 +143,12 @@ def frame(
     for one in following:
         _check_behavior(replace(one.behavior, level=domain.situations[one.situation].level), domain)
     individuals_named(domain, names)
+    lowest = max(domain.levels, default=HIGHEST_LEVEL)
+    seen = {name: replace(one, level=min(one.level, lowest)) for name, one in domain.situations.items()}
     try:
-        domain = extrema_replaced(domain)
+        domain = extrema_replaced(
+            replace(domain, situations=seen)
+        )  # the lowest level with behaviours sees all situation types
     except DomainError as error:
         raise KnowledgeError(str(error)) from None
     return Frame(schema, parts, domain, classes, parents, properties, lifted)

@@ -29,7 +29,16 @@ from confab.reasoner.names import Names, brief
 from confab.reasoner.reading.facts import check_values, facts_of, initial_state
 from confab.reasoner.reading.frame import Frame, frame, names_of
 from confab.reasoner.reading.goals import with_task
-from confab.reasoner.reading.rows import Member, OntologySchema, Triple, core_triple, index_of, nodes_of, stated
+from confab.reasoner.reading.rows import (
+    HIGHEST_LEVEL,
+    Member,
+    OntologySchema,
+    Triple,
+    core_triple,
+    index_of,
+    nodes_of,
+    stated,
+)
 from confab.reasoner.reading.schema import read_schema
 from confab.reasoner.reading.times import with_times
 from confab.reasoner.symbols import Problem
@@ -135,7 +144,8 @@ def reading_of(
     initial = with_totals(domain, known.classes, relations, initial)
     check_values(initial | exceptions(domain, known.classes, relations, initial), domain, names)
     check("reading the scene")
-    levels = {names.short(iri): level for iri, level in schema.from_levels.items() if iri not in schema.nodes}
+    lowest = max(domain.levels, default=HIGHEST_LEVEL)  # this level sees all values
+    levels = {names.short(iri): min(at, lowest) for iri, at in schema.from_levels.items() if iri not in schema.nodes}
     problem = Problem(scene, domain, known.classes, relations, initial, {}, known.parents, levels)
     wanted = with_task(problem, known.parts, schema.of_kind("Task"))
     return Reading(with_times(wanted, known.parts, schema), names, schema, whole)

@@ -158,8 +158,8 @@ def link(row: Sequence[Term], blank: bool = False) -> Triple:
         raise KnowledgeError(f"a node without a name has a value of {local_name(text(predicate))}; name the individual")
     if not (isinstance(value, ox.NamedNode) or (blank and isinstance(value, ox.BlankNode))):
         what = f"the text '{text(value)[:60]}'" if isinstance(value, ox.Literal) else "a node without a name"
-        who = "a node without a name" if isinstance(subject, ox.BlankNode) else f"<{text(subject)}>"
-        said, number = f"{who}: {local_name(text(predicate))}", NOT_OF_AMOUNTS.get(text(predicate))
+        name = "a node without a name" if isinstance(subject, ox.BlankNode) else f"<{text(subject)}>"
+        said, number = f"{name}: {local_name(text(predicate))}", NOT_OF_AMOUNTS.get(text(predicate))
         if number and isinstance(value, ox.Literal) and exact(text(value)) is not None:
             raise KnowledgeError(f"{said} is the number {text(value)}; name an individual, or, for an amount, {number}")
         raise KnowledgeError(

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import confab
+from confab.memory import Memory
 from confab.planner.experience.advice import Advisor, plan
 from confab.planner.experience.allowance import FREE
 from confab.planner.experience.evidence import FactReader
@@ -379,6 +380,15 @@ def test_rules_are_followed_in_refinements_with_most_of_the_search_effort() -> N
     live(experience, [(few, led.plan)])
     again = plan(few, Advisor(experience), improve=0)
     assert expanded(again, 2) <= 1.1 * again.plan.length[2] if again.plan else False
+
+
+def test_a_refinement_that_skips_a_level_teaches_no_method_of_the_next_level() -> None:
+    scene = confab.load(Path(__file__).parent / "cases" / "refinement-that-skips-a-level.ttl")
+    plan = scene.plan(engine="none").plan
+    assert plan is not None and any(step.level > len(step.path) for step in plan.primitives)
+    memory = Memory.of(scene)
+    memory.learn(scene, plan)
+    assert scene.plan(engine="none", mode="leading", memory=memory).solved
 
 
 @pytest.mark.parametrize("world", ["laboratory", "couriers", "packing", "canteen"])
