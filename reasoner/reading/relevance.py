@@ -56,6 +56,7 @@ from confab.reasoner.symbols import (
     ValueCondition,
     ValueEffect,
     Witness,
+    substituted,
 )
 from confab.reasoner.vocabulary import CORE, PREFIXES, TYPE
 
@@ -259,27 +260,35 @@ def _scopes(conditions: Sequence[Condition], kinds: Mapping[str, str]) -> list[_
     """Return the conjunctions that conditions contain, including nested conjunctions.
 
     The first conjunction contains the positive conditions. Each further conjunction adds an alternative or a negated conjunction to
-    the positive conditions.
+    the positive conditions. Different variables of nested conjunctions get different names.
     """
     leaves: list[Condition] = []
-    groups: list[tuple[tuple[Condition, ...], Mapping[str, str]]] = []
-    waiting = list(conditions)
-    kinds = dict(kinds)
+    groups: list[tuple[Sequence[Condition], Mapping[str, str]]] = []
+    waiting, kinds, named = list(conditions), dict(kinds), {*kinds}
+
+    def apart(variable: str, inner: Sequence[Condition]) -> tuple[str, list[Condition]]:
+        name = variable
+        while name in named:
+            name += "'"
+        named.add(name)
+        return name, [substituted(condition, {variable: name}) for condition in inner]
+
     while waiting:
         match waiting.pop():
             case Witness(variable, kind, inner, negated):
+                name, inside = apart(variable, inner)
                 if negated:
-                    groups.append((inner, {variable: kind}))
+                    groups.append((inside, {name: kind}))
                 else:
-                    kinds[variable] = kind
-                    waiting += inner
+                    kinds[name] = kind
+                    waiting += inside
             case AnyOf(alternatives):
                 groups += [(alternative, {}) for alternative in alternatives]
             case leaf:
                 leaves.append(leaf)
     found = [_TypedConjunction(tuple(leaves), kinds)]
-    for inner, bound in groups:
-        found += _scopes((*leaves, *inner), {**kinds, **bound})
+    for group, bound in groups:
+        found += _scopes((*leaves, *group), {**kinds, **bound})
     return found
 
 

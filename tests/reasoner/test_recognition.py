@@ -273,6 +273,33 @@ def test_a_class_may_have_the_name_of_a_term_of_the_model(tmp_path: Path, word: 
     assert recognise(graph).problem.classes[word] == read(graph).problem.classes[word] == ("cup1",)
 
 
+def test_conditions_on_two_individuals_lead_to_individuals_with_unstated_defaults_too(tmp_path: Path) -> None:
+    """Both conditions name their individual alike; only one of the two individuals has a stated value."""
+    scene = skeleton(tmp_path)
+    scene.write_text(
+        scene.read_text(encoding="utf-8")
+        + """
+:LAMP a owl:Class, owl:NamedIndividual, c:SituationType ; c:valueProperty :lamp ; c:defaultValue :off .
+:WALL a owl:Class, owl:NamedIndividual, c:SituationType ; c:valueProperty :wall ; c:defaultValue :white .
+:lamp a owl:ObjectProperty, owl:FunctionalProperty ; rdfs:domain :Room ; rdfs:range :LAMP .
+:wall a owl:ObjectProperty, owl:FunctionalProperty ; rdfs:domain :Room ; rdfs:range :WALL .
+:off a owl:NamedIndividual, :LAMP . :on a owl:NamedIndividual, :LAMP .
+:white a owl:NamedIndividual, :WALL . :red a owl:NamedIndividual, :WALL .
+:Room a owl:Class ; rdfs:subClassOf c:Object ; c:hasSituationType :LAMP, :WALL .
+:hall a owl:NamedIndividual, :Room . :cellar a owl:NamedIndividual, :Room ; :lamp :on ; :wall :red .
+:SWITCH a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:parameter :SWITCH.room ; c:postcondition :SWITCH.off ;
+  c:precondition :SWITCH.dark, :SWITCH.red .
+:SWITCH.room a owl:NamedIndividual, c:Parameter ; c:termType :Room .
+:SWITCH.dark a owl:NamedIndividual, c:AbsenceCondition ; c:situationType :LAMP ; c:ofClass :Room ; c:value :off ; c:negated true .
+:SWITCH.red a owl:NamedIndividual, c:AbsenceCondition ; c:situationType :WALL ; c:ofClass :Room ; c:value :red ; c:negated true .
+:SWITCH.off a owl:NamedIndividual, c:ValueEffect ; c:situationType :LAMP ; c:about :SWITCH.room ; c:value :off .
+""",
+        encoding="utf-8",
+    )
+    reading = recognise(load(scene), ["cellar LAMP off"])
+    assert reading.problem.classes["Room"] == ("cellar", "hall")
+
+
 def test_an_individual_may_have_the_name_of_a_property(tmp_path: Path) -> None:
     scene = skeleton(tmp_path)
     scene.write_text(scene.read_text(encoding="utf-8").replace(":plate1", ":isAt"), encoding="utf-8")
