@@ -35,7 +35,7 @@ PART = re.compile(
 )
 """Pattern of the parts of the schema query that only derived situations and amounts need."""
 COMPARING = (
-    "confab.planner.hierarchical.chains",
+    "confab.planner.hierarchical.few_steps",
     "confab.planner.hierarchical.refinement",
     "confab.planner.hierarchical.scope",
     "confab.planner.hierarchical.call",

@@ -3,15 +3,17 @@
 =========  ==========================================================  ================================
 mode       how it plans                                                module
 =========  ==========================================================  ================================
-guarded    goals in series; rules with a good record propose steps     `confab.planner.experience.advice`
-leading    goals in series; all rules propose steps                    `confab.planner.experience.advice`
-strict     goals in series; rules propose no steps                     `confab.planner.experience.advice`
+guarded    goals in series; rules with a good record propose steps     `confab.planner.hierarchical.planner`
+leading    goals in series; all rules propose steps                    `confab.planner.hierarchical.planner`
+strict     goals in series; rules propose no steps                     `confab.planner.hierarchical.planner`
 optimal    shortened until a lower bound is met, without memory         `confab.planner.hierarchical.bounds`
 paper      A* with eq. (5) on each level                                `confab.planner.paper.hierarchy`
 =========  ==========================================================  ================================
 
-`confab.planner.validation` has accepted every returned plan. `confab.planner.certificate_checks` has accepted the
-certificate of every unsolvable outcome. The plan checker and the certificate checker share no code with any search.
+If there is a memory, `confab.planner.experience.advice` attaches its rules to the first three modes. A checker has accepted every
+returned plan: `confab.planner.validation`, or `confab.planner.timed.validation` if steps overlap. The checker
+`confab.planner.certificate_checks` has accepted the certificate of every unsolvable outcome. The checkers share no code with any
+search.
 """
 
 from __future__ import annotations
@@ -90,10 +92,10 @@ def solve(request: Request) -> Outcome:
     """
     if request.mode not in MODES:
         raise ValueError(f"unknown mode '{request.mode}'; wanted one of {', '.join(MODES)}")
-    deadline, by_need = Deadline.after(request.limits.seconds), may_overlap_by_need(request.problem)
+    deadline, overlaps = Deadline.after(request.limits.seconds), may_overlap_by_need(request.problem)
     try:
         with within(deadline):
-            outcome = _overlapping(request, deadline) if by_need else MODES[request.mode](request)
+            outcome = _overlapping(request, deadline) if overlaps else MODES[request.mode](request)
     except MemoryError:
         return Outcome(Status.GAVE_UP, reason=OUT_OF_MEMORY)
     except OutOfTimeError as error:
@@ -128,7 +130,7 @@ def _overlapping(request: Request, deadline: Deadline) -> Outcome:
     from confab.planner.timed.validation import validate_in_sequence
 
     problem, first = request.problem, request.first
-    by_need = judged_by_events(problem)
+    by_event = judged_by_events(problem)
     if first is not None and schedule_of(first) is not None:
         return Outcome(Status.GAVE_UP, reason=Reason("a plan whose steps must overlap isn't changed"))
     outcome = Outcome(Status.GAVE_UP, reason=Reason("some steps need other steps meanwhile"))
@@ -139,7 +141,7 @@ def _overlapping(request: Request, deadline: Deadline) -> Outcome:
             with overtime():
                 faults = validate_in_sequence(problem, outcome.plan)
             if not faults:
-                return replace(outcome, bound=None) if by_need else outcome  # overlapping steps may cost less
+                return replace(outcome, bound=None) if by_event else outcome  # overlapping steps may cost less
             reason = Reason(f"the steps of the found plan can't be executed one after another: {faults[0].text}")
             outcome = replace(outcome, status=Status.GAVE_UP, plan=None, reason=reason, left=(), forgone=(), cost=None)
     proof = _last_proof(problem, deadline)
@@ -161,9 +163,11 @@ def unchecked(outcome: Outcome, error: OutOfTimeError) -> Outcome:
 
 def _with_experience(request: Request) -> Outcome:
     if request.memory is None:
-        from confab.planner.hierarchical.planner import plan as without
+        from confab.planner.hierarchical.planner import plan as plan_without_memory
 
-        return without(request.problem, limits=request.limits, leave_levels=request.leave_levels, first=request.first)
+        return plan_without_memory(
+            request.problem, limits=request.limits, leave_levels=request.leave_levels, first=request.first
+        )
     from confab.planner.experience.advice import plan
 
     return plan(
@@ -196,7 +200,7 @@ def _paper(request: Request) -> Outcome:
 
 
 def _last_proof(problem: Problem, deadline: Deadline, finding: float = 1.0) -> UnsolvableError | None:
-    """Return a proof that few tests find after the search has reached another limit than its share `finding` of the time."""
+    """Search briefly for a proof of unsolvability, unless the search ended because its share `finding` of the time had passed."""
     from confab.planner.hierarchical.planner import SEARCHING
     from confab.planner.hierarchical.unsolvability import AT_ONCE, impossible
 

@@ -21,7 +21,7 @@ OLD_NAMES = {
     *("astray", "despair", "fast_plan", "mending", "wary", "Guide", "attain", "vain"),
 }
 """Names of classes, functions and parameters that were replaced: SymmetryClasses, StepFootprint, SearchBudget, RepairResult,
-Event, RetryPolicy, Subgoal, Subgoals, SearchBudget, dead_end, on_no_plan, hierarchical_plan, repairs, dead_end_check,
+Event, RetryPolicy, Subgoal, Subgoals, SearchBudget, dead_end, on_no_plan, hierarchical_plan, repairs, meanwhile,
 RulePolicy, achieve, wasted_effort."""
 NEW_ROOMS = ("planner", "reasoner", "confab", "sim")
 SHARED = frozenset(["Episode", "Outcome", "Step", "Table", "Verdict"])

@@ -150,7 +150,7 @@ def plan(
     mode: str = "guarded",
     limits: Limits = Limits(),  # noqa: B008 - frozen
     using: Compiled | None = None,
-    improve: int = fast.ORDERS,
+    improve: int = fast.DEFAULT_WORK,
     leave_levels: bool = True,
     first: Outcome | None = None,
 ) -> Outcome:

@@ -207,7 +207,7 @@ class RulePolicy:
 
     def undone_within_reach(self, level: int, mark: int) -> bool:
         """Return whether rules can restore the achieved goals of the call that were undone since a marked state."""
-        kept, trail = self.call.kept, self.call.table.trail[mark:]
+        kept, trail = self.call.achieved, self.call.table.trail[mark:]
         undone = dict.fromkeys((situation, key) for situation, key, _ in trail if (situation, key) in kept)
         return level != self.first or all(self.instances.distance(level, (cell, kept[cell])) < inf for cell in undone)
 
@@ -380,10 +380,10 @@ def by_rules(policy: RulePolicy) -> None:
         progress = False
         for cell, value in sorted(policy.open().items(), key=lambda item: policy.waits(item[0])):
             if not call.met(cell):
-                steps = policy.attempt(policy.first, {cell: value}, call.space.keeping(call.kept))
+                steps = policy.attempt(policy.first, {cell: value}, call.space.keeping(call.achieved))
                 if steps is not None:
                     call.steps += steps
-                    call.kept[cell] = value
+                    call.achieved[cell] = value
                     progress = True
 
 

@@ -283,7 +283,7 @@ class Instances:
         else:
             done = self.call.space.forward[instance.ground[0]](*instance.ground[1])
             changes = [((situation, key), value) for situation, key, value in done[1]] if done is not None else []
-        return sum(value != self.call.kept.get(cell, value) for cell, value in changes)
+        return sum(value != self.call.achieved.get(cell, value) for cell, value in changes)
 
     def next(self, level: int, instance: RuleInstance, goal: Goal) -> RuleInstance | None:
         """Return the cheapest instance of the same rule for a goal in the current state, or None if there is no such instance.

@@ -1,8 +1,8 @@
 """The agenda: the planner achieves the goals one after another on one table and keeps the achieved goals.
 
-`open` contains goals that the planner tries to achieve in one step of the most abstract level. `asleep` contains blocked goals;
-a goal wakes when a symbol that it waits for changes. `kept` contains achieved goals; later steps may violate these goals
-temporarily, but must restore them. `before` contains ordering constraints: a goal waits for other goals that would become
+`_open` contains goals that the planner tries to achieve in one step of the most abstract level. `_asleep` contains blocked goals;
+`_woken_by` tells which of them wake when a symbol changes. `Call.achieved` contains achieved goals; later steps may violate these
+goals temporarily, but must restore them. `_before` contains ordering constraints: a goal waits for other goals that would become
 unreachable (a cup is moved before it is filled).
 
 If no goal is achieved in one step, the agenda raises the search budget gradually, on each level from the top. A failed
@@ -27,7 +27,7 @@ from confab.planner.hierarchical.search_budget import (
     PART,
     WHOLE,
     SearchBudget,
-    scopes,
+    scope_budgets,
 )
 from confab.planner.hierarchical.unsolvability import Proofs
 from confab.planner.plan import Plan
@@ -47,9 +47,8 @@ class Agenda:
         levels may be used.
     quickly : bool
         Whether the agenda tries only relevant steps and small scopes.
-    trial : bool
-        Whether applied steps are final, and a failure proves nothing. Otherwise, the agenda may restart from the initial state, and
-        attempts to prove that there is no plan.
+    only_forward : bool
+        Whether the agenda neither restarts from the initial state nor attempts to prove that there is no plan.
     found : function, optional
         Function that is called with a plan of the lowest level, found meanwhile (`Proofs.found`).
     """
@@ -57,27 +56,27 @@ class Agenda:
     call: Call
     levels: tuple[int, ...] | None = None
     quickly: bool = False
-    trial: bool = False
+    only_forward: bool = False
     found: Callable[[Plan, bool], bool] | None = None
     _open: deque[Cell] = field(default_factory=deque)
     _asleep: dict[Cell, None] = field(default_factory=dict)
-    _waiting: dict[Cell, list[Cell]] = field(default_factory=dict)
+    _woken_by: dict[Cell, list[Cell]] = field(default_factory=dict)
     _before: Mapping[Cell, Sequence[Cell]] = field(default_factory=dict)
     _tried: dict[int, int] = field(default_factory=dict)
     _restarted: bool = False
     proofs: Proofs = field(init=False)
 
     def __post_init__(self) -> None:
-        """Prepare the attempts to prove that there is no plan; a trial makes none."""
-        self.proofs = Proofs(self.call, not self.trial, self.found)
+        """Prepare the attempts to prove that there is no plan; an agenda that goes only forward makes none."""
+        self.proofs = Proofs(self.call, not self.only_forward, self.found)
 
     # ------------------------------------------------------------------------------------------------- one goal after another
 
     def achieve_all(self) -> bool:
         """Achieve the goals one after another, with larger search budgets for blocked goals; return whether all goals hold."""
         call = self.call
-        if not self.trial:
-            call.space.dead_end_check = self.proofs.check
+        if not self.only_forward:
+            call.space.meanwhile = self.proofs.check
         self.begin()
         while self._open or self._asleep:
             mark = len(call.table.trail)
@@ -85,12 +84,12 @@ class Agenda:
                 cell = self._open.popleft()
                 call.space.check_time()
                 if call.met(cell):
-                    call.kept[cell] = call.goal[cell]
-                elif self.at_once(cell):
+                    call.achieved[cell] = call.goal[cell]
+                elif self.by_one_step(cell):
                     self.wake(mark)
                     mark = len(call.table.trail)
             redone, steps = call.redone, len(call.steps)
-            if self._asleep and not self.harder():
+            if self._asleep and not self.with_larger_budgets():
                 return False
             self.wake(mark if call.redone == redone else 0)
             # If no step was applied, the number of sleeping goals must decrease. Therefore the loop ends.
@@ -100,25 +99,25 @@ class Agenda:
                     return False
                 for cell in there:
                     del self._asleep[cell]
-                    call.kept[cell] = call.goal[cell]
+                    call.achieved[cell] = call.goal[cell]
         self.proofs.wanted = False
         return True
 
     def begin(self) -> None:
         """Put all goals that don't hold into the queue of open goals, and determine the order of goals."""
         call = self.call
-        self._before, self._asleep, self._waiting = order(call), {}, {}
-        call.kept = {cell: value for cell, value in call.goal.items() if call.met(cell)}
-        call.refiner.hasty = self.may_bring_to_rest()
-        self._open = deque(cell for cell in call.goal if cell not in call.kept)
+        self._before, self._asleep, self._woken_by = order(call), {}, {}
+        call.achieved = {cell: value for cell, value in call.goal.items() if call.met(cell)}
+        call.refiner.before_rest = self.may_bring_to_rest()
+        self._open = deque(cell for cell in call.goal if cell not in call.achieved)
 
-    def at_once(self, cell: Cell) -> bool:
+    def by_one_step(self, cell: Cell) -> bool:
         """Achieve a goal by advice or by one step of the most abstract level; return whether that succeeded.
 
         If neither the advice nor one step achieves the goal, put the goal to sleep.
         """
         call, first = self.call, self.call.program.levels[0]
-        unmet = [other for other in self._before.get(cell, ()) if other not in call.kept]
+        unmet = [other for other in self._before.get(cell, ()) if other not in call.achieved]
         promised = call.advice.rank(cell) if call.advice is not None and not unmet else 0
         if not unmet and promised == 1 and call.achieve_goal(first, cell, BY_RULES):
             return True
@@ -126,7 +125,7 @@ class Agenda:
             return True
         self._asleep[cell] = None
         for other in unmet or waits_for(call.space, call.program.levels[0], cell, call.goal[cell]):
-            self._waiting.setdefault(other, []).append(cell)
+            self._woken_by.setdefault(other, []).append(cell)
         return False
 
     def wake(self, mark: int) -> None:
@@ -139,54 +138,54 @@ class Agenda:
 
         for situation, key, _ in call.table.trail[mark:]:
             cell = situation, key
-            for waiting in self._waiting.pop(cell, ()):
+            for waiting in self._woken_by.pop(cell, ()):
                 if waiting in asleep:
                     opened(waiting)
                     call.failed.pop(waiting, None)
-            if cell in call.kept:
+            if cell in call.achieved:
                 asleep.pop(cell, None)
                 if not call.met(cell):
-                    del call.kept[cell]
+                    del call.achieved[cell]
                     opened(cell)
             elif cell in asleep:
                 opened(cell)
         for cell in call.space.defined:
-            if cell in call.kept and not call.met(cell):
-                del call.kept[cell]
+            if cell in call.achieved and not call.met(cell):
+                del call.achieved[cell]
                 opened(cell)
             elif cell in asleep and call.met(cell):
                 opened(cell)
 
     # ------------------------------------------------------------------------------------------------------- larger budgets
 
-    def harder(self) -> bool:
-        """Achieve a sleeping goal with a larger budget, or on a lower level; return whether that succeeded."""
+    def with_larger_budgets(self) -> bool:
+        """Achieve a sleeping goal with larger budgets, or on a lower level; return whether that succeeded."""
         call = self.call
         self.proofs.certify()
         self.proofs.check()
-        if call.advice is not None and self.singly(call.program.levels[0], BY_RULES):
+        if call.advice is not None and self.one_goal(call.program.levels[0], BY_RULES):
             return True
         for level in call.program.levels:
-            *small, large = scopes(call.program.size(level))
-            if self.singly(level, FEW_STEPS) or self.singly(level, *small) or self.bring_to_rest():
+            *small, large = scope_budgets(call.program.size(level))
+            if self.one_goal(level, FEW_STEPS) or self.one_goal(level, *small) or self.bring_to_rest():
                 return True
             if self.quickly:
                 continue
-            if self.restart(level) or self.singly(level, large) or self.all_goals(level):
+            if self.restart(level) or self.one_goal(level, large) or self.all_goals(level):
                 return True
             if self.allowed(level):
                 self.proofs.attempt()
         if call.progressed:  # the state has changed since some attempts failed
             call.failed.clear()
             call.progressed = False
-            return self.harder()
+            return self.with_larger_budgets()
         return False
 
     def allowed(self, level: int, cell: Cell | None = None) -> bool:
         """Return whether steps of a level may be used for a goal."""
         return self.levels is None or level in self.levels or cell in self.call.unseen
 
-    def singly(self, level: int, *budgets: SearchBudget) -> bool:
+    def one_goal(self, level: int, *budgets: SearchBudget) -> bool:
         """Achieve a sleeping goal with the given budgets on a level; return whether that succeeded."""
         call = self.call
         last = call.unseen.issuperset(self._asleep)
@@ -207,7 +206,7 @@ class Agenda:
     def _ready(self) -> Iterator[Cell]:
         """Yield the sleeping goals that wait for no unachieved goal; if there is no such goal, yield all sleeping goals."""
         call = self.call
-        ready = [c for c in self._asleep if all(other in call.kept for other in self._before.get(c, ()))]
+        ready = [c for c in self._asleep if all(other in call.achieved for other in self._before.get(c, ()))]
         yield from (sorted(ready, key=call.advice.waits) if call.advice is not None else ready) or self._asleep
 
     def advised(self, cell: Cell) -> bool:
@@ -235,7 +234,7 @@ class Agenda:
         call = self.call
         if not self.may_bring_to_rest():
             return False
-        call.brought_to_rest, call.refiner.hasty, steps = True, False, len(call.steps)
+        call.brought_to_rest, call.refiner.before_rest, steps = True, False, len(call.steps)
         bring_to_rest(call)
         if len(call.steps) > steps:
             call.given_up.append("steps of a lower level bring symbols to rest that aren't at rest in the beginning")
@@ -250,22 +249,22 @@ class Agenda:
         change on an upper level.
         """
         call, refiner = self.call, self.call.refiner
-        if not call.steps or self.trial or self._restarted or level != call.program.levels[0]:
+        if not call.steps or self.only_forward or self._restarted or level != call.program.levels[0]:
             return False
         if not any(call.space.visible(level, cell) for cell in self._asleep):
             return False
         self._restarted = True
-        steps, given_up, kept = call.steps, call.given_up, call.kept
+        steps, given_up, kept = call.steps, call.given_up, call.achieved
         call.replace_steps(())
         call.steps, call.given_up = [], []
-        call.kept = {cell: value for cell, value in call.goal.items() if call.met(cell)}
+        call.achieved = {cell: value for cell, value in call.goal.items() if call.met(cell)}
         refiner.careful = True
         if self.all_goals(level):
             self.begin()
             return True
         refiner.careful = False
         call.replace_steps(steps)
-        call.steps, call.given_up, call.kept = steps, given_up, kept
+        call.steps, call.given_up, call.achieved = steps, given_up, kept
         return False
 
     def all_goals(self, level: int) -> bool:
@@ -292,11 +291,15 @@ class Agenda:
 
 
 def order(call: Call) -> dict[Cell, list[Cell]]:
-    """Return, for each goal, the goals that would become unreachable, and therefore must be achieved earlier."""
+    """Return, for each goal, the goals that would become unreachable, and therefore must be achieved earlier.
+
+    One pair of goals represents all pairs with the same two situation types and the same symmetry class of the first goal's first
+    individual.
+    """
     by_individual: dict[str, list[Cell]] = {}
     for cell in call.goal:
         plain = cell[0] not in call.program.rules and call.problem.domain.situations[cell[0]].quantity is None
-        if cell not in call.kept and plain:
+        if cell not in call.achieved and plain:
             for individual in {*arguments_of(cell[1]), call.goal[cell]}:
                 by_individual.setdefault(individual, []).append(cell)
     before: dict[Cell, list[Cell]] = {}

@@ -63,15 +63,15 @@ class Call:
         self.table = Table(problem.domain.situations, problem.initial)
         self.space = Workspace(self.program, self.table, self.goal, deadline, most)
         self.refiner = Refiner(self.space, using.methods)
-        self.kept = {cell: value for cell, value in self.goal.items() if self.met(cell)}
+        self.achieved = {cell: value for cell, value in self.goal.items() if self.met(cell)}
         first, rest = self.program.levels[0], self.space.rest
         self.unseen = {
             cell
             for cell, value in self.goal.items()
             if not self.space.visible(first, cell) and rest.get(cell[0]) in (None, value)
         }
-        """Goals that the most abstract level doesn't see; additional steps in the refinement of the last step achieve
-        these goals."""
+        """Goals that the most abstract level doesn't see and no rest value contradicts; additional steps in the refinement of the
+        last step achieve these goals."""
         self.advice: GoalAdvice | None = None
         self.steps: list[RefinedStep] = []
         self.given_up: list[str] = []
@@ -111,7 +111,7 @@ class Call:
             self.table.undo(0)
             return False
         self.steps, self.given_up = applied, list(found.given_up)
-        self.kept = {cell: value for cell, value in self.goal.items() if self.met(cell)}
+        self.achieved = {cell: value for cell, value in self.goal.items() if self.met(cell)}
         self.space.worked = found.effort
         self.space.most_work += found.effort
         self.count(found)
@@ -124,14 +124,14 @@ class Call:
     def achieve_goals(self, level: int, targets: dict[Cell, str], *budgets: SearchBudget) -> bool:
         """Apply refined steps of a level so that the targets and all achieved goals hold; return whether that succeeded."""
         first = self.program.levels[0]
-        self.aim, self.refiner.at = targets, None
+        self.aim, self.refiner.unrefined = targets, None
         last = self._last_step(level, targets)
         keep = self._keeping(level) if last is None else self._keeping_in_last_step()
         steps = self.refiner.achieve(level, targets, keep, budgets)
         if steps is None:
             return False
         self.progressed = True
-        self.kept.update(targets)
+        self.achieved.update(targets)
         if last is not None:
             self.steps[-1] = last._replace(steps=(*last.steps, *steps))
             return True
@@ -154,8 +154,8 @@ class Call:
     def _keeping(self, level: int) -> Keep:
         """Return the function `keep` for steps of a level: they keep the achieved goals that the level sees."""
         if level == self.program.levels[0] and self.unseen:
-            return self.space.keeping({c: value for c, value in self.kept.items() if c not in self.unseen})
-        return self.space.keeping(self.kept)
+            return self.space.keeping({c: value for c, value in self.achieved.items() if c not in self.unseen})
+        return self.space.keeping(self.achieved)
 
     def _keeping_in_last_step(self) -> Keep:
         """Return the function `keep` for additional steps in the refinement of the last step.
@@ -165,7 +165,7 @@ class Call:
         first, visible = self.program.levels[0], self.space.visible
         above = self.space.refining(first)
         return lambda cell, value: (
-            above(cell, value) if visible(first, cell) else self.kept.get(cell) or above(cell, value)
+            above(cell, value) if visible(first, cell) else self.achieved.get(cell) or above(cell, value)
         )
 
     def met(self, cell: Cell) -> bool:
@@ -225,7 +225,7 @@ class Call:
 def fresh_call(call: Call, problem: Problem) -> Call:
     """Return a new call from the initial state of a problem; the new call shares the refinements and nogoods of `call`."""
     other = Call(problem, call.using, call.space.deadline, call.space.most)
-    other.refiner.found, other.refiner.nogoods.known = call.refiner.found, call.refiner.nogoods.known
+    other.refiner.refinements, other.refiner.nogoods.known = call.refiner.refinements, call.refiner.nogoods.known
     return other
 
 
@@ -260,7 +260,7 @@ def bring_to_rest(call: Call) -> bool:
             for key, value in cells.items()
             if call.problem.value_levels.get(value, 1) == level and (name, key) in call.goal
         }
-        keep = call.space.keeping(call.kept)
+        keep = call.space.keeping(call.achieved)
         for wanted in ({**targets, **hidden}, targets):
             steps = call.refiner.achieve(level, wanted, keep, (REFINING,))
             if steps is not None:

@@ -1,16 +1,21 @@
 """The default planner: it achieves the goals one after another, refines each step at once, and finally shortens the plan.
 
-======  =========================================================================  =========================================
-word    meaning                                                                    module
-======  =========================================================================  =========================================
-agenda  achieve the goals in turn; raise the search budget if all are blocked      `confab.planner.hierarchical.agenda`
-call    achieve one goal by steps of a level, and apply these steps to the table   `confab.planner.hierarchical.call`
-chains  search for a few steps, backwards from the required values                 `confab.planner.hierarchical.chains`
-scope   ground and search a part of the world, on one level                        `confab.planner.hierarchical.scope`
-refine  replace a step by steps of the next level: a method, a chain or a scope    `confab.planner.hierarchical.refinement`
-prove   test whether there is no plan, when all goals are blocked                  `confab.planner.hierarchical.unsolvability`
-shorten try other orders of the goals, replace windows of steps, remove detours    `confab.planner.hierarchical.shortening`
-======  =========================================================================  =========================================
+The modules, in a good order for reading:
+
+=============  =====================================================================================
+module         purpose
+=============  =====================================================================================
+workspace      the table of current values, the compiled behaviours, and the work of one call
+call           achieve one goal by steps of a level, and apply these steps to the table
+agenda         achieve the goals one after another; with larger budgets if all goals are blocked
+refinement     achieve targets on a level: replay a method, or search with one budget after another
+search_budget  the limits of one search
+few_steps      search for a few relevant steps
+scope          ground and search a part of the world, on one level
+unsolvability  prove that there is no plan, or find a plan of the lowest level, during planning
+shortening     make the plan cheaper: other orders of the goals, removal of detours, windows
+windows        replace consecutive steps of a level by cheaper steps
+=============  =====================================================================================
 
 A failed search of a level above the lowest never proves that there is no plan.
 """
@@ -26,7 +31,7 @@ from time import perf_counter
 from confab.planner.hierarchical.agenda import Agenda
 from confab.planner.hierarchical.call import Call, Compiled, as_refined, compiled
 from confab.planner.hierarchical.scope import BITS
-from confab.planner.hierarchical.shortening import ORDERS, shortened
+from confab.planner.hierarchical.shortening import DEFAULT_WORK, shortened
 from confab.planner.hierarchical.unsolvability import FINALLY, LOOKING, TURNS
 from confab.planner.hierarchical.windows import regroupings
 from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, UnsolvableError, paused_collection
@@ -35,33 +40,33 @@ from confab.planner.validation import validate
 from confab.reasoner.limits import LimitError, current, within
 from confab.reasoner.symbols import Problem
 
-__all__ = ["ORDERS", "Call", "Compiled", "compiled", "plan"]
+__all__ = ["DEFAULT_WORK", "Call", "Compiled", "compiled", "plan"]
 
 FLAT = 50_000_000
-"""Maximum work of searching a task of one level as a whole, before planning goal by goal; the unit is a bit of a relaxed plan.
+"""Maximum work of searching a problem of one level as a whole, before planning goal by goal; the unit is a bit of a relaxed plan.
 
 The maximum work corresponds to a few seconds.
 """
 FLAT_ROWS = 30_000
-"""Maximum number of rows of a join when a task of one level is grounded as a whole."""
+"""Maximum number of rows of a join when a problem of one level is grounded as a whole."""
 VAST = 1_000_000
-"""Number of quantified behaviours of a task of one level above which the task is first searched without grounding."""
+"""Number of quantified behaviours above which a problem of one level is first searched without grounding."""
 TRIALS = 400_000
-"""Maximum number of trials if a level can't be grounded (about four seconds); a trial tests one behaviour in one state."""
-FIRST = 8
-"""Divisor of `TRIALS` for a task of one level before planning goal by goal."""
+"""Maximum number of tests of behaviours in states if a level can't be grounded (about four seconds)."""
+TRIALS_AT_FIRST = TRIALS // 8
+"""Maximum number of these tests for a problem of one level, before planning goal by goal."""
 NOT_LEFT = "levels must not be left"
 SEARCHING, SHORTENING = 0.93, 0.85
-"""Shares of the time limit after which the search ends, and after which a plan isn't shortened any more.
+"""Shares of the time limit: the search ends at the first share, and shortening at the second, even if the search ended later.
 
-The other time is for checking the plan, and for releasing memory.
+The remaining time is for checking the plan, and for releasing memory.
 """
 
 CHECKS = 1.5
 """Time that is kept for the checks of a plan, in units of the time of a check of the plan before it is shortened."""
 
 
-def alone(call: Call) -> None:
+def without_advice(call: Call) -> None:
     """Do nothing: the call gets no advice."""
 
 
@@ -69,10 +74,10 @@ def plan(
     problem: Problem,
     *,
     limits: Limits = Limits(),  # noqa: B008 - frozen
-    improve: int = ORDERS,
+    improve: int = DEFAULT_WORK,
     using: Compiled | None = None,
     leave_levels: bool = True,
-    advised: Callable[[Call], None] = alone,
+    advised: Callable[[Call], None] = without_advice,
     first: Outcome | None = None,
 ) -> Outcome:
     """Plan: achieve the goals of a problem one after another, and refine each step at once.
@@ -116,7 +121,7 @@ def _plan(
     one_level = improve > 0 and len(problem.domain.levels) == 1
     vast = one_level and is_vast(problem)
     flat = None
-    if one_level and not vast and advised is alone and first is None:
+    if one_level and not vast and advised is without_advice and first is None:
         flat = flat_first(problem, limits, deadline)  # saves compiling thousands of conditional effects
         if flat.status is Status.SOLVED and deadline is None:
             return flat
@@ -129,15 +134,15 @@ def _plan(
     advised(call)
     levels = call.program.levels if leave_levels else call.program.levels[:1]
     lowest = LowestLevelPlan(call, limits.end(SEARCHING))
-    agenda = Agenda(call, levels, found=lowest.keep if leave_levels else None)
+    agenda = Agenda(call, levels, found=lowest.offer if leave_levels else None)
     try:
         resumed = first is not None and call.resume(first)
-        more = resumed and call.kept.keys() != call.goal.keys()
-        if more and not Agenda(call, levels, quickly=True, trial=True).achieve_all():
+        more = resumed and call.achieved.keys() != call.goal.keys()
+        if more and not Agenda(call, levels, quickly=True, only_forward=True).achieve_all():
             return call.outcome(Status.GAVE_UP, reason=Reason("a quick search found no steps that extend the plan"))
         done = resumed or (one_level and by_rules_alone(call))
         if one_level and not done:
-            done = vast and without_grounding(call, TRIALS // FIRST)
+            done = vast and without_grounding(call, TRIALS_AT_FIRST)
         if one_level and not done:
             flat = flat or flat_first(problem, limits, deadline)
             call.count(flat)
@@ -146,7 +151,7 @@ def _plan(
             if flat.plan is not None:
                 call.steps, call.bound, done = as_refined(call, flat.plan.steps), flat.bound, True
             elif not vast:
-                done = without_grounding(call, TRIALS // FIRST)
+                done = without_grounding(call, TRIALS_AT_FIRST)
         done = done or agenda.achieve_all()
         why = "" if done else last_resort(agenda, limits, leave_levels, lowest)
     except UnsolvableError as proof:
@@ -154,14 +159,14 @@ def _plan(
     except LimitError as limit:
         done, why = False, f"stopped at the limit: {limit}"
     if not done and lowest.plan is None:
-        return given_up(call, why)
+        return no_plan(call, why)
     if not done:
-        lowest.replace_steps()
+        lowest.adopt()
     call.space.most_work, call.space.deadline = math.inf, before_the_check(call, until)
     shorten = improve and (done or not lowest.cheapest)
     plan = shortened(call, improve, leave_levels, advised) if shorten else call.tree()
     if not leave_levels and any(step.level != levels[0] for step in plan.steps):
-        return given_up(call, f"a goal that level {levels[0]} doesn't see requires steps below it, and {NOT_LEFT}")
+        return no_plan(call, f"a goal that level {levels[0]} doesn't see requires steps below it, and {NOT_LEFT}")
     return call.outcome(Status.SOLVED, plan)
 
 
@@ -177,15 +182,15 @@ def before_the_check(call: Call, until: float | None) -> float | None:
 
 
 class LowestLevelPlan:
-    """A plan of the lowest level that is found during planning goal by goal; then this goes on until the time `end` at most."""
+    """A plan of the lowest level that is found during planning goal by goal, which then goes on until the time `end` at most."""
 
     def __init__(self, call: Call, end: float | None) -> None:
         self.call, self.end = call, end
         self.plan: Plan | None = None
         self.cheapest = False
 
-    def keep(self, plan: Plan, cheapest: bool) -> bool:
-        """Keep a plan, grouped under steps of the levels above; return whether it is a plan of the call's problem.
+    def offer(self, plan: Plan, cheapest: bool) -> bool:
+        """Group a plan under steps of the levels above and keep it; return whether it is a plan of the call's problem.
 
         Planning goal by goal ends at once if the plan is a cheapest plan, and all its steps have been grouped under single steps of
         the first level. Otherwise it goes on with as much work as it has done, and at least with the work `LOOKING`; with `TURNS`
@@ -194,7 +199,7 @@ class LowestLevelPlan:
         Raises
         ------
         LimitError
-            Planning goal by goal ends at once.
+            Planning goal by goal ends at once, since the plan is the answer.
         """
         call, space = self.call, self.call.space
         plans = regroupings(call.problem, plan, call.program.levels[-1], call.using)
@@ -209,11 +214,11 @@ class LowestLevelPlan:
             raise LimitError("a cheapest plan was found")
         return True
 
-    def replace_steps(self) -> None:
+    def adopt(self) -> None:
         """Replace the steps of the call by the plan."""
         call, (first, *lower) = self.call, self.call.program.levels
         assert self.plan is not None
-        call.steps, call.given_up, call.kept = as_refined(call, self.plan.steps), [], dict(call.goal)
+        call.steps, call.given_up, call.achieved = as_refined(call, self.plan.steps), [], dict(call.goal)
         if self.cheapest:
             call.bound = cost_of(call.problem, self.plan)
         if any(step.level != first for step in self.plan.steps):
@@ -233,12 +238,12 @@ def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool, lowest: Lowe
     if proofs.too_large is None:
         return reason.text
     if without_grounding(call, TRIALS):
-        lowest.keep(call.tree(), False)
+        lowest.offer(call.tree(), False)
     return f"planning goal by goal found no plan, and {proofs.too_large.text}"
 
 
 def is_vast(problem: Problem) -> bool:
-    """Return whether a task of one level has too many quantified behaviours to be grounded first."""
+    """Return whether a problem of one level has too many quantified behaviours to be grounded first."""
     (level,) = problem.domain.levels
     return problem.quantified(level) > VAST
 
@@ -252,7 +257,7 @@ def without_grounding(call: Call, trials: int) -> bool:
     return steps is not None
 
 
-def given_up(call: Call, why: str) -> Outcome:
+def no_plan(call: Call, why: str) -> Outcome:
     """Return the outcome of a call that gave up, with the reason `why`, the current goal and the current step."""
     from confab.planner.hierarchical.stuck import gave_up
 
@@ -261,14 +266,14 @@ def given_up(call: Call, why: str) -> Outcome:
 
 def by_rules_alone(call: Call) -> bool:
     """Achieve all goals by learned rules if there are rules for all goals; return whether that succeeded."""
-    return call.advice is not None and call.advice.expects and Agenda(call, (), trial=True).achieve_all()
+    return call.advice is not None and call.advice.expects and Agenda(call, (), only_forward=True).achieve_all()
 
 
 def flat_first(problem: Problem, limits: Limits, deadline: float | None) -> Outcome:
-    """Search a task of one level as a whole with bounded work; give up when the bound is reached.
+    """Search a problem of one level as a whole with bounded work; give up when the bound is reached.
 
-    A task of one level has no refinements that guide planning goal by goal. Therefore the planner tries the whole task first. The
-    work is bounded, because the task may have too many goals, or may be too large for grounding.
+    A problem of one level has no refinements that guide planning goal by goal. Therefore the planner tries the whole problem first.
+    The work is bounded, because the problem may have too many goals, or may be too large for grounding.
     """
     from confab.planner.grounded.best_first import plan_level
 

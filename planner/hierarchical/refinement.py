@@ -14,11 +14,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Protocol
 
-from confab.planner.hierarchical.chains import Chain
+from confab.planner.hierarchical.few_steps import FewSteps
 from confab.planner.hierarchical.methods import Methods, Roles
 from confab.planner.hierarchical.nogoods import Nogoods
 from confab.planner.hierarchical.scope import Scope
-from confab.planner.hierarchical.search_budget import BY_RULES, REFINING, SMALL, SearchBudget, scopes
+from confab.planner.hierarchical.search_budget import BY_RULES, REFINING, SMALL, SearchBudget, scope_budgets
 from confab.planner.hierarchical.workspace import Ground, Keep, Workspace
 from confab.planner.transitions import Cell, Change, Changes
 from confab.reasoner.amounts import meets
@@ -50,8 +50,8 @@ class RefinedStep(NamedTuple):
         return (self, *self.joined)
 
 
-class RefinementTask(NamedTuple):
-    """A step to be refined, as its behaviour and the individuals of its parameters and variables.
+class StepToRefine(NamedTuple):
+    """A step to be refined: its behaviour, and the individuals of its parameters and variables.
 
     If `careful`, symbols that the level of the step doesn't see keep their values.
     """
@@ -72,7 +72,7 @@ class Advice(Protocol):
 
 
 class Refiner:
-    """Methods that achieve targets and apply steps in the current state of a workspace.
+    """Achieves targets and applies steps in the current state of a workspace.
 
     Parameters
     ----------
@@ -91,15 +91,15 @@ class Refiner:
         changed = frozenset[str]().union(*(b.changes for b in space.program.domain.behaviors.values()))
         situations = space.program.domain.situations.values()
         self.drifting = any(s.level > self.levels[0] and s.rest is None and s.name in changed for s in situations)
-        self.found: dict[object, tuple[RefinedStep, ...]] = {}
-        """The known refinements, by task and state; a refinement is replayed if the same task occurs in the same state."""
+        self.refinements: dict[object, tuple[RefinedStep, ...]] = {}
+        """The known refinements; a refinement is replayed if the same step is refined in the same state."""
         self.careful = False
         """Whether refinements avoid changes of symbols that the level above doesn't see."""
-        self.hasty = False
-        """Whether refinements are searched only in small scopes."""
+        self.before_rest = False
+        """Whether symbols may still be brought to rest; until then, refinements are searched in small scopes, with few attempts."""
         self.advice: Advice | None = None
-        self.at: Ground | None = None
-        """The step of the most abstract level that is being refined, or the last step whose refinement failed."""
+        self.unrefined: Ground | None = None
+        """The latest step of the most abstract level that has no refinement so far, or none in its state."""
 
     def do(self, level: int, name: str, arguments: tuple[str, ...]) -> RefinedStep | None:
         """Apply a step with its refinement to primitives, and return the refined step.
@@ -114,18 +114,18 @@ class Refiner:
             self.space.apply(changes)
             return RefinedStep(level, name, arguments, bindings, ())
         below = self.levels[self.levels.index(level) + 1]
-        larger = (SMALL,) if self.hasty else scopes(self.space.program.size(below))
+        larger = (SMALL,) if self.before_rest else scope_budgets(self.space.program.size(below))
         budgets = (BY_RULES, REFINING, *larger)
         targets = self.targets(level, changes)
-        self.at = (name, arguments) if level == self.levels[0] else self.at
+        self.unrefined = (name, arguments) if level == self.levels[0] else self.unrefined
         steps = None
         for careful in (True, False) if self.careful else (False,):
             if steps is None:
-                task = RefinementTask(name, arguments + bindings, careful)
-                steps = self.achieve(below, targets, self.space.refining(level, careful), budgets, task)
+                refined = StepToRefine(name, arguments + bindings, careful)
+                steps = self.achieve(below, targets, self.space.refining(level, careful), budgets, refined)
         if steps is None:
             return None
-        self.at = None if level == self.levels[0] else self.at
+        self.unrefined = None if level == self.levels[0] else self.unrefined
         return RefinedStep(level, name, arguments, bindings, tuple(steps))
 
     def achieve(
@@ -134,7 +134,7 @@ class Refiner:
         targets: Mapping[Cell, str],
         keep: Keep,
         budgets: Sequence[SearchBudget],
-        task: RefinementTask | None = None,
+        refined: StepToRefine | None = None,
     ) -> Sequence[RefinedStep] | None:
         """Apply refined steps of a level that achieve the targets and respect `keep`, and return these steps.
 
@@ -148,32 +148,32 @@ class Refiner:
             Function that returns the required final value of the cell, or None if any value is allowed.
         budgets : sequence of SearchBudget
             Budgets that are tried one after another.
-        task : RefinementTask, optional
-            The step to be refined, or None if the targets are goals.
+        refined : StepToRefine, optional
+            The step whose effects are the targets, or None if the targets are goals.
         """
         here: object = None
-        if task is not None:
-            for method, roles in self.methods.of(task.behavior, task.individuals):
+        if refined is not None:
+            for method, roles in self.methods.of(refined.behavior, refined.individuals):
                 steps = self.replay_method(level, method, roles, targets, keep)
                 if steps is not None:
                     self.hits += 1
                     self.methods.prefer(method)
                     return steps
-            here = task, frozenset(self.table.since(0).items())
-            if here in self.found:
+            here = refined, frozenset(self.table.since(0).items())
+            if here in self.refinements:
                 self.hits += 1
-                for step in self.found[here]:
+                for step in self.refinements[here]:
                     self.replay(step)
-                return self.found[here]
+                return self.refinements[here]
             self.misses += 1
         found = None
         for budget in budgets:
             found = self.searched(level, targets, keep, budget)
             if found is not None:
                 break
-        if found is not None and task is not None:
-            self.found[here] = tuple(found)
-            self.methods.learn(task.behavior, [(step.behavior, step.arguments) for step in found], task.individuals)
+        if found is not None and refined is not None:
+            self.refinements[here] = tuple(found)
+            self.methods.learn(refined.behavior, [(one.behavior, one.arguments) for one in found], refined.individuals)
         return found
 
     def searched(
@@ -190,7 +190,7 @@ class Refiner:
             return None
         table, mark, wanted = self.table, len(self.table.trail), dict(targets)
         search = first_search = begun(self.space, level, wanted, keep, budget)
-        for _ in range(FEW_ATTEMPTS if self.hasty else ATTEMPTS):
+        for _ in range(FEW_ATTEMPTS if self.before_rest else ATTEMPTS):
             found = search.search()
             if found is None:
                 break
@@ -357,8 +357,10 @@ class Refiner:
         return done is not None
 
 
-def begun(space: Workspace, level: int, targets: Mapping[Cell, str], keep: Keep, budget: SearchBudget) -> Chain | Scope:
-    """Return a search with a budget: a `Chain` if the budget limits the number of steps, otherwise a `Scope`."""
+def begun(
+    space: Workspace, level: int, targets: Mapping[Cell, str], keep: Keep, budget: SearchBudget
+) -> FewSteps | Scope:
+    """Return a search with a budget: for few steps if the budget limits their number, otherwise in a scope."""
     if budget.steps:
-        return Chain(space, level, targets, keep, budget.steps)
+        return FewSteps(space, level, targets, keep, budget.steps)
     return Scope(space, level, targets, keep, budget)

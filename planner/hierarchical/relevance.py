@@ -39,7 +39,7 @@ def relevant_achievers(
     level: int,
     cell: Cell,
     value: str,
-    questions: int = QUESTIONS,
+    most_values: int = QUESTIONS,
     met: dict[str, None] | None = None,
     asked: Asked | None = None,
 ) -> Iterator[tuple[int, Ground | None]]:
@@ -56,7 +56,7 @@ def relevant_achievers(
         subgoals = space.subgoals.defining(*cell, value == TRUE, level)
     blocked: list[tuple[Achiever, tuple[int, ...], Env]] = []
     length = 0
-    while (blocked or not length) and len(asked) < questions:
+    while (blocked or not length) and len(asked) < most_values:
         length += 1
         yield length, None
         if blocked:  # only callers that need longer chains reach this point

@@ -1,4 +1,4 @@
-"""A scope: a part of the world that is grounded and searched on one level if no short chain of relevant steps suffices.
+"""A scope: a part of the world that is grounded and searched on one level if a few relevant steps don't suffice.
 
 The individuals in *focus* occur in the targets, or in chains towards the targets. Steps involve only individuals in focus.
 *Frozen* individuals have a fixed state. The frozen individuals are the values of individuals in focus, and the individuals over
@@ -41,16 +41,19 @@ from confab.reasoner.symbols import (
 if TYPE_CHECKING:
     from confab.planner.grounded.task import Task
 
-FEW = 4
+SMALL_CLASS = 4
 """Maximum size of a class, such as the hands, that is part of every scope.
 
-The objects that have an individual of the scope as value are added to the scope if there are at most `FEW` of them.
+The objects that have an individual of the scope as value are added to the scope if there are at most `SMALL_CLASS` of them.
 """
 
 BITS = 20
 """Number of bits that a search processes for each relaxed operator and state, including overhead."""
 LEAST, MAKING = 300, 100
-"""Minimum number of relaxed operators that is assumed for a task, and cost of grounding a task, in examined states."""
+"""Minimum number of relaxed operators that is assumed for a grounded scope, and cost of grounding it, in examined states."""
+ROWS = 5
+"""Maximum number of rows of a join when a scope is grounded, for each state whose examination costs as much as the budget allows
+after grounding."""
 
 
 class Scope:
@@ -85,7 +88,7 @@ class Scope:
             if wanted := keep(cell, ""):
                 goal.setdefault(Symbol(cell[0], arguments_of(cell[1])), wanted)
         self.held = small.initial
-        return ground(small, level, goal=goal, most=5 * budget.work // MAKING, deadline=space.deadline, apart=True)
+        return ground(small, level, goal=goal, most=ROWS * budget.work // MAKING, deadline=space.deadline, apart=True)
 
     def search(self) -> list[Ground] | None:
         """Return steps that achieve the targets, or None if no steps are found."""
@@ -116,17 +119,17 @@ class Scope:
 
 def focus(space: Workspace, level: int, targets: Mapping[Cell, str], budget: SearchBudget) -> set[str] | None:
     """Return the individuals in focus for the given targets, or None for all individuals."""
-    if budget.questions is None:
+    if budget.most_values is None:
         return None
     program, table = space.program, space.table
     met: dict[str, None] = dict.fromkeys(program.named)
     for cell, value in targets.items():
         met.update(dict.fromkeys((*arguments_of(cell[1]), value)))
     for cell, value in targets.items():
-        for _ in relevant_achievers(space, level, cell, value, budget.questions, met):
+        for _ in relevant_achievers(space, level, cell, value, budget.most_values, met):
             pass
     for members in program.problem.classes.values():
-        if len(members) <= FEW:
+        if len(members) <= SMALL_CLASS:
             met.update(dict.fromkeys(members))
     met.update(dict.fromkeys(space.candidates.spare(met, level, budget.spares)))
     for individual in tuple(met):  # add the values of the individual, and the few objects whose value is the individual
@@ -136,7 +139,7 @@ def focus(space: Workspace, level: int, targets: Mapping[Cell, str], budget: Sea
             if individual in cells:
                 met[cells[individual]] = None
             holders = table.holders[situation].get(individual, ())
-            if len(holders) <= FEW:
+            if len(holders) <= SMALL_CLASS:
                 for key in holders:
                     met.update(dict.fromkeys(arguments_of(key)))
     return set(met) - {FALSE}
@@ -198,7 +201,7 @@ def with_frozen(space: Workspace, level: int, inside: AbstractSet[str]) -> set[s
         for condition, kind in ((c, witness.kind) for witness in witnesses for c in witness.conditions):
             if isinstance(condition, ValueCondition):
                 holders = table.holders[condition.situation]
-                keys = [key for one in fresh for key in tuple(holders.get(one, ()))[: FEW + 1]]
+                keys = [key for one in fresh for key in tuple(holders.get(one, ()))[: SMALL_CLASS + 1]]
                 met.update(argument for key in keys for argument in arguments_of(key))
             elif isinstance(condition, RelationCondition):
                 rows, members = program.rows_of.get(condition.relation, {}), program.members.get(kind, ())

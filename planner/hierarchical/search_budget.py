@@ -18,8 +18,8 @@ class SearchBudget:
     ----------
     steps : int
         Maximum number of relevant steps; 0 for the search of a scope.
-    questions : int, optional
-        To determine the scope, at most this number of values is examined for each target; None if the scope is the whole level.
+    most_values : int, optional
+        Maximum number of values that are examined for each target to determine the scope; None if the scope is the whole level.
     spares : int
         Number of additional individuals of each symmetry class in the scope.
     work : int
@@ -29,7 +29,7 @@ class SearchBudget:
     """
 
     steps: int = 0
-    questions: int | None = None
+    most_values: int | None = None
     spares: int = 1
     work: int = 200_000
     rules: bool = False
@@ -39,12 +39,12 @@ BY_RULES = SearchBudget(rules=True)
 """Budget for following learned rules; the rules have a separate limit of work."""
 ONE_STEP, FEW_STEPS, REFINING = SearchBudget(steps=1), SearchBudget(steps=3), SearchBudget(steps=4)
 """Budgets for one relevant step towards a goal, for a few relevant steps towards a goal, and for a refinement."""
-SMALL, WIDER = SearchBudget(questions=10, spares=0, work=50_000), SearchBudget(questions=20)
-WIDE, WHOLE = SearchBudget(questions=160, spares=4, work=MUCH), SearchBudget(work=MUCH)
+SMALL, WIDER = SearchBudget(most_values=10, spares=0, work=50_000), SearchBudget(most_values=20)
+WIDE, WHOLE = SearchBudget(most_values=160, spares=4, work=MUCH), SearchBudget(work=MUCH)
 PART = SearchBudget(work=MUCH // 8)
 """Budget for a search of a whole level before a proof of unsolvability is tried."""
 
 
-def scopes(size: int) -> tuple[SearchBudget, ...]:
+def scope_budgets(size: int) -> tuple[SearchBudget, ...]:
     """Return the budgets for searching scopes of a level with `size` quantified behaviours, the cheapest budget first."""
     return (SMALL, WIDER, WHOLE if size <= MOST_OPERATORS else WIDE)

@@ -1,11 +1,12 @@
 """Shortening of a plan, by default with at most half of the effort of finding the plan.
 
-The first method plans the goals again in other orders, and reuses known refinements. The second method replaces consecutive steps
-of a level by cheaper steps (`confab.planner.hierarchical.windows`). The third method removes steps whose changes cancel out
-(`confab.planner.hierarchical.detours`). The primitives after the first state with all goals are always dropped.
+There are three ways, in this order: the goals are planned again in other orders, with the known refinements; steps whose changes
+cancel out are removed (`confab.planner.hierarchical.detours`); windows, that is consecutive steps of a level, are replaced by
+cheaper steps (`confab.planner.hierarchical.windows`), on the lowest level after changes of the order of all steps. The primitives
+after the first state with all goals are always dropped.
 
-Other orders are tried only if the plan moves an object away or has many steps per goal. The second method, which may refine several
-steps together, is used only if a shorter plan is likely. The cheapest plan is kept; among equally cheap plans, the plan with the
+Other orders are tried only if the plan moves an object away or has many steps per goal. Windows, which may refine several steps
+together, are used only if a shorter plan is likely. The cheapest plan is kept; among equally cheap plans, the plan with the
 fewest primitives. Steps of the first level explain the steps below. Therefore steps of the first level are dropped only if the plan
 becomes much cheaper.
 """
@@ -32,8 +33,8 @@ from confab.planner.validation import validate
 from confab.reasoner.limits import LimitError
 from confab.reasoner.symbols import Symbol, ValueCondition
 
-ORDERS = 8
-"""Default work of shortening a plan, in sixteenths of the effort of finding the plan; more work leads to shorter plans."""
+DEFAULT_WORK = 8
+"""Default work of shortening a plan, in sixteenths of the effort of finding the plan: half of the effort."""
 SHUFFLES = 3
 """Number of random orders of the goals that are tried before small changes of the best order."""
 LEAST_EFFORT = 600_000
@@ -71,7 +72,7 @@ def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Cal
     if prices(call) > 1 and call.bound is None:
         call.bound = lower_bound(call)
     improve = 1 if call.space.shortening == "brief" else improve
-    work, random = max(call.space.effort, LEAST_EFFORT) * improve // (2 * ORDERS), Random(0)
+    work, random = max(call.space.effort, LEAST_EFFORT) * improve // (2 * DEFAULT_WORK), Random(0)
     rounds = useful = 0
     most = {"none": 0, "brief": int(call.space.deadline is None), "once": 1, "repeated": inf}[call.space.shortening]
     while rounds < min(most, max(LEAST_ROUNDS, 2 * useful)):
@@ -175,7 +176,7 @@ def reordered(call: Call, work: int, advised: Callable[[Call], None], random: Ra
     Only steps of the most abstract level are tried. Advice is used only for refinements, because advice for goals would lead to the
     same steps.
     """
-    order = list(call.kept)
+    order = list(call.achieved)
     tried = {tuple(order)}
     for other_order in neighbours(order, random) if len(order) > 1 else ():
         call.space.check_time()
@@ -190,10 +191,10 @@ def reordered(call: Call, work: int, advised: Callable[[Call], None], random: Ra
         other.space.most_work = work
         advised(other)
         other.advice = None
-        agenda = Agenda(other, levels=call.program.levels[:1], quickly=True, trial=True)
+        agenda = Agenda(other, levels=call.program.levels[:1], quickly=True, only_forward=True)
         with suppress(LimitError):
             if agenda.achieve_all() and cost(other) <= cost(call):
-                order[:] = other.kept
+                order[:] = other.achieved
                 call.steps = other.steps if cost(other) < cost(call) and call.accepts(other.tree()) else call.steps
         work -= other.space.effort + DOING * len(primitives(other.steps))
 

@@ -27,10 +27,10 @@ def gave_up(call: Call, why: str) -> Reason:
         for cell, value in call.aim.items():
             terms.update(dict.fromkeys((cell[0], *arguments_of(cell[1]), value)))
         parts.append(
-            f"{len(call.kept)} of {len(call.goal)} goals were reached, {goals[0]}{', …' * (len(goals) > 1)} was next"
+            f"{len(call.achieved)} of {len(call.goal)} goals were reached, {goals[0]}{', …' * (len(goals) > 1)} was next"
         )
-    if call.refiner.at is not None:
-        name, arguments = call.refiner.at
+    if call.refiner.unrefined is not None:
+        name, arguments = call.refiner.unrefined
         parts.append(f"{' '.join((name, *arguments))} wasn't refined there")
         terms.update(dict.fromkeys((name, *arguments)))
     parts += missing_amounts(call)

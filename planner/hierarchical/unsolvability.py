@@ -40,7 +40,7 @@ TEST = 8
 """Work of testing one condition, in the unit of `Workspace.effort`."""
 REPEATED, FINALLY = 4, 2
 """Factors by which the limit of tests must have grown before a certificate is searched again: during planning, and at its end."""
-FEW = 1_000
+STATES_AT_FIRST = 1_000
 """The lowest level is examined when the searches have cost as much as examining this number of its states."""
 TURNS = 4
 """The search of the lowest level as a whole has cost at most the effort of planning goal by goal, divided by this number."""
@@ -85,7 +85,7 @@ class Proofs:
         space, program = self.call.space, self.call.program
         if space.effort >= TEST * FIRST_TESTS:
             self.certify()
-        if space.effort >= FEW * program.size(program.levels[-1]):
+        if space.effort >= STATES_AT_FIRST * program.size(program.levels[-1]):
             self.examine()
 
     def certify(self, ahead: int = 0, growth: int = REPEATED) -> None:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 PER_PRIMITIVE = 3
 """A shortened plan must lose fewer level-1 steps than this number times the saved cost (in primitives of mean cost)."""
-KEPT = 1.5
+MUCH_CHEAPER = 1.5
 """Factor by which the cost must decrease if primitives replace steps of the most abstract level."""
 MOST_ROWS, OF_A_STEP = 20_000, 500
 """Maximum number of rows of a join when a level is grounded for shortening: in total, and for each step of the plan."""
@@ -53,7 +53,7 @@ def replaced(call: Call, level: int, new: Sequence[Ground]) -> bool:
             return False
         other.steps.append(step)
     if not all(map(other.met, other.goal)):  # goals that the level doesn't see are open
-        Agenda(other, call.program.levels[:1], quickly=True, trial=True).achieve_all()
+        Agenda(other, call.program.levels[:1], quickly=True, only_forward=True).achieve_all()
     problem, old = call.problem, call.tree()
     for plan in regroupings(problem, other.tree(), level, call.using):
         if improves(problem, plan, old, level) and not validate(problem, plan) and call.accepts(plan):
@@ -129,14 +129,14 @@ def improves(problem: Problem, new: Plan, old: Plan, level: int) -> bool:
 
     For each saved primitive, the new plan must lose fewer than `PER_PRIMITIVE` steps of the most abstract level. The number of
     saved primitives is the saved cost divided by the mean cost of a primitive. If the old plan has only steps of the most abstract
-    level, and primitives replace some of these steps, the new plan must be cheaper by the factor `KEPT`.
+    level, and steps of the lowest level replace some of these steps, the new plan must be cheaper by the factor `MUCH_CHEAPER`.
     """
     price, before = compared(problem, new.primitives), compared(problem, old.primitives)
     first, last = problem.domain.levels[0], problem.domain.levels[-1]
     lost = len(old.at_level(first)) - len(new.at_level(first)) if any(step.level > first for step in new.steps) else 0
     dear = lost > 0 and first != level == last and all(step.level == first for step in old.steps)
     return (
-        before > price * (KEPT if dear else 1.0)
+        before > price * (MUCH_CHEAPER if dear else 1.0)
         and PER_PRIMITIVE * (before - price) * len(old.primitives) > lost * before
         and broken(problem, new) <= broken(problem, old)
     )

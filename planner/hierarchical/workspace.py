@@ -1,11 +1,11 @@
-"""The common data of all searches of one call: the table of current values, the bound behaviours, and the budget.
+"""The common data of all searches of one call: the table of current values, the compiled behaviours, and the limits of the work.
 
 `table` contains the current values of all symbols; changes are made in place and can be undone. `forward` contains a function for
 each behaviour; given the arguments, it returns the changes, or None if the behaviour isn't applicable. `achieving` contains a
 function for each effect; given a symbol and a value, it yields the arguments with which the effect achieves the value. `keep` is a
-function of a symbol and its first value; it returns the required final value, or None if any value is allowed. The budget is the
-work of all searches, in units of about a microsecond. The search of a scope costs the number of states times the number of
-operators; an expansion costs 100.
+function of a symbol and its first value; it returns the required final value, or None if any value is allowed. The work of all
+searches is counted in units of about a microsecond. The unit is one operator in one state; an expansion of the search for few steps
+costs 100.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
 Keep: TypeAlias = "Callable[[Cell, str], str | None]"
 """Function of a changed symbol and its first value that returns the required final value, or None if any value is allowed."""
 EXPANSION = 100
-"""The cost of an expansion in the unit of the budget."""
+"""The work of an expansion."""
 
 
 def no_check() -> None:
-    """Do nothing; this is the default test for dead ends."""
+    """Do nothing; this is the default of `Workspace.meanwhile`."""
 
 
 @dataclass
 class Workspace:
-    """The table, the bound behaviours and the budget of one call.
+    """The table, the compiled behaviours and the limits of one call.
 
     Parameters
     ----------
@@ -53,8 +53,9 @@ class Workspace:
         Maximum work in scopes (number of states times number of operators); `LimitError` is raised above this work.
     shortening : str
         Work for a shorter plan: "none", "brief", "once" or "repeated" (`Limits.shortening`).
-    dead_end_check : function
-        Function that tests whether the problem is unsolvable; it is called each time that the effort has doubled.
+    meanwhile : function
+        Function that looks for a proof of unsolvability or for a plan of the lowest level; it is called each time that the effort
+        has doubled.
     """
 
     program: Program
@@ -64,7 +65,7 @@ class Workspace:
     most: int = 200_000
     most_work: float = math.inf
     shortening: Shortening = "once"
-    dead_end_check: Callable[[], None] = no_check
+    meanwhile: Callable[[], None] = no_check
     counts: dict[int, Counts] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -173,7 +174,7 @@ class Workspace:
             raise LimitError(f"{self.most} expansions")
         if self.effort > self.checked_at:
             self.checked_at = 2 * self.effort
-            self.dead_end_check()
+            self.meanwhile()
         self.check_time()
 
     def check_time(self) -> None:

@@ -224,12 +224,12 @@ def test_a_plan_of_the_lowest_level_is_found_while_planning_goal_by_goal_goes_on
 def test_a_plan_of_the_lowest_level_is_shortened_for_all_goals_of_the_task() -> None:
     problem = tabletop()
     call = Call(problem, compiled(problem), None, 500)
-    call.kept = dict(list(call.goal.items())[:2])  # planning goal by goal has achieved some of the goals
+    call.achieved = dict(list(call.goal.items())[:2])  # planning goal by goal has achieved some of the goals
     flat = plan_level(problem, problem.domain.levels[-1])
     assert flat.plan is not None
     lowest = LowestLevelPlan(call, None)
-    assert lowest.keep(flat.plan, False)
-    lowest.replace_steps()
+    assert lowest.offer(flat.plan, False)
+    lowest.adopt()
     reordered(call, 10**6, lambda _: None, Random(0))
     assert validate(problem, call.tree()) == []
 

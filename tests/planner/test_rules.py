@@ -480,7 +480,7 @@ def test_steps_of_a_failed_rule_are_undone_and_rules_pause_until_search_has_done
     for cell, value in policy.open().items():
         if (
             not policy.allowance.wasted_effort
-            and policy.follow(level, {cell: value}, call.space.keeping(call.kept)) is None
+            and policy.follow(level, {cell: value}, call.space.keeping(call.achieved)) is None
         ):
             assert call.table.state() == before
     assert policy.allowance.wasted_expansions > 0
@@ -495,7 +495,7 @@ def test_wasted_work_of_rules_is_counted_and_rules_pause_above_a_limit() -> None
     call = Call(within, compiled(within), None, 100_000)
     policy = RulePolicy(call, taught().rules)
     level, (cell, value) = call.program.levels[0], next(iter(policy.open().items()))
-    targets, keep = {cell: value}, call.space.keeping(call.kept)
+    targets, keep = {cell: value}, call.space.keeping(call.achieved)
     before = call.table.state()
     policy.allowance.wasted_effort = policy.allowance.left() - 1
     assert policy.ready()

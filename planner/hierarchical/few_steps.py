@@ -1,4 +1,4 @@
-"""Search for a few relevant steps that achieve targets, by iterative deepening on a table.
+"""Search for a few relevant steps that achieve targets, forward from the current state, by iterative deepening on a table.
 
 `targets` are the symbols to be changed, each with its required value. `off` contains the symbols that don't have their required
 final value; the search succeeds when no such symbol remains. `changed` contains the symbols that differ from the start, each with
@@ -26,8 +26,8 @@ MOST_EXPANSIONS = 150
 """Maximum number of expansions of one search for a few steps."""
 
 
-class Chain:
-    """A search for a few relevant steps; the caller repeats the search if a step has no refinement."""
+class FewSteps:
+    """A search for a few relevant steps; the caller repeats the search if one of the steps has no refinement."""
 
     def __init__(self, space: Workspace, level: int, targets: Mapping[Cell, str], keep: Keep, longest: int) -> None:
         self.space, self.level, self.targets, self.keep, self.longest = space, level, targets, keep, longest
