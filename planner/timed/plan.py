@@ -13,7 +13,7 @@ from confab.reasoner.names import brief, known_as
 THESE_STEPS = "these steps"
 """The name of the lower bound that holds for all schedules of the same steps.
 
-The schedules keep the order of conflicting steps. Turns may have any order and any possible actor.
+The schedules keep the order of conflicting steps. Turns may have any order and any interchangeable actor.
 """
 
 
