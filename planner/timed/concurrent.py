@@ -52,7 +52,7 @@ from confab.reasoner.timing import only_during, projected, timing_of
 
 BEGIN, END, RUNNING, HELD, BUSY = "@begin", "@end", "@running", "@held", "@busy"
 FIRST = 0.5
-"""Share of the time limit for the search without durations."""
+"""Share of the remaining time for each search without durations."""
 MOST_STATES = 300_000
 """Maximum number of states of the search with durations."""
 _StateKey: TypeAlias = "tuple[int, tuple[int, ...]]"
@@ -322,7 +322,7 @@ class _Finder:
         for never in (shorter, set[int]()) if shorter else (shorter,):
             task = excluding(self.task, never | self.oversized, self.marks | idle)
             for one in (task, replace(task, goal=task.goal | idle)):
-                first = search(one, limits, limits.end(FIRST))
+                first = search(one, limits, limits.until(self.deadline).end(FIRST))
                 self.counts.add(first.counts)
                 whole = self.completed(list(first.plan)) if first.status is Status.SOLVED else None
                 if whole is not None:
@@ -481,7 +481,7 @@ class _Finder:
         return 0 if timing_of(whole).asked(Span.END) else self.task.changes_of(end)[0]
 
     def times(self, node: _SearchNode, ending: Mapping[int, int]) -> list[int] | None:
-        """Return the earliest begin of each step of a node, given that the running steps in `ending` are the next to end.
+        """Return the earliest begin of each step of a node, given that the running steps in `ending` end in any order.
 
         The last entry is the time from the begin of the first ending step to the events that its end must wait for. Return None if
         a step would end too late.
@@ -492,7 +492,7 @@ class _Finder:
         arcs: list[tuple[int, int, int]] = []
         lasts = node.lasts
         for j, later in enumerate(events):
-            for earlier in events[:j]:
+            for earlier in node.window[:j]:
                 if earlier.step == later.step or not (
                     earlier.writes & (later.reads | later.writes) or earlier.reads & later.writes
                 ):
