@@ -1,4 +1,4 @@
-"""The checker of timed plans; it shares with the scheduler only the division of behaviours into pieces (docs/levels.md, "In time").
+"""The checker of timed plans; it shares `pieces.py` and the reading of facts with the scheduler (docs/levels.md, "In time").
 
 The checker simulates the primitives on symbols at their times. At each instant, ends come before begins. Every condition is
 evaluated at the times that its span requires. A condition with the span `throughout` is evaluated again after every event. A value
@@ -206,14 +206,15 @@ class _TimedExecution:
         fixed = self.times.events.get(step.behavior)
         if fixed is not None and fixed != time:
             yield Fault(step.path, f"{step}: it happens at {fixed} s, not at {time} s")
-        facts.clear()
         terms = terms_at(self.rules, pieces, step.arguments, facts)
+        facts.clear()
         seconds = duration_of(self.problem, pieces.whole, terms, facts)
         if seconds is None or (slot.end - slot.begin != seconds and not self.executed):
             yield Fault(step.path, f"{step}: it takes {slot.end - slot.begin} s here; its duration is {seconds} s")
             return
         one = _Running(slot, pieces, terms, [], number)
         self.made[number] = {}
+        yield from self.foreign(one, [], time)
         yield from self.done(one, pieces.begin, time)
         facts.clear()
         making = self.rules.changes(pieces.middle, terms, facts)
