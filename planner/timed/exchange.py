@@ -1,7 +1,8 @@
 """Alternative actors for the turns of a plan; a turn is a part in which an actor leaves its first state and returns to it.
 
-An alternative actor belongs to the same classes as the actor of the plan, and their symbols have the same initial values. The
-static facts allow the steps of the alternative actor. The plan checker decides whether the result is a plan.
+An alternative actor belongs to the same classes as the actor of the plan, their symbols have the same initial values, and they are
+available in the same time windows. The static facts allow the steps of the alternative actor. The plan checker decides whether the
+result is a plan.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from confab.reasoner.symbols import (
     EqualityCondition,
     Problem,
     RelationCondition,
+    Times,
 )
 
 
@@ -41,7 +43,7 @@ def choices_of(problem: Problem, plan: Plan, order: Order, network: Network) -> 
         The network of `order`.
     """
     actors = {one.actor: i for i, one in enumerate(order.resources) if one.actor is not None}
-    every = _of_the_classes(problem, actors)
+    every = _alike(problem, actors)
     if not any(every.values()):
         return ActorChoices()
     rules, facts = BehaviorReader(problem), LoggedState(problem, problem.initial)
@@ -101,12 +103,12 @@ def exchanged(problem: Problem, plan: Plan, renamed: Mapping[int, Mapping[str, s
     return Plan(tuple(map(other, plan.steps)))
 
 
-def _of_the_classes(problem: Problem, actors: Iterable[str]) -> dict[str, list[str]]:
-    """Return, for each actor, the other actors of the same classes whose symbols have the same initial values.
+def _alike(problem: Problem, actors: Iterable[str]) -> dict[str, list[str]]:
+    """Return, for each actor, the other actors of the same classes with the same time windows and the same initial values.
 
     An actor that the goal names has no alternatives.
     """
-    actors = list(actors)
+    actors, windows = list(actors), (problem.times or Times()).windows
     kinds: dict[str, set[str]] = {
         a: {kind for kind, members in problem.classes.items() if a in members} for a in actors
     }
@@ -121,7 +123,9 @@ def _of_the_classes(problem: Problem, actors: Iterable[str]) -> dict[str, list[s
         one: [
             other
             for other in actors
-            if other != one and kinds[one] == kinds[other] and about[one] == about[other] and not {one, other} & wanted
+            if other != one
+            and not {one, other} & wanted
+            and all(of.get(one) == of.get(other) for of in (kinds, about, windows))
         ]
         for one in actors
     }

@@ -288,7 +288,7 @@ def least(order: Order, network: Network, choices: ActorChoices) -> int:
     """Return a lower bound on the makespan of any schedule of the activities with any possible actors.
 
     The bound is the greatest of three numbers: the longest chain of precedences, the work that only some actors can do divided by
-    the number of these actors, and the work that uses a pool divided by its stock.
+    the number of these actors, after the earliest begin of this work, and the work that uses a pool divided by its stock.
     """
     lasts = list(network.durations)
     for its in choices.lasts.values():
@@ -301,12 +301,18 @@ def least(order: Order, network: Network, choices: ActorChoices) -> int:
     begins = earliest(free, (), lasts)
     bound = begins.makespan if begins is not None else 0
     work: dict[frozenset[int], int] = defaultdict(int)
+    first: dict[frozenset[int], int] = {}
     for turn in chain.from_iterable(order.turns):
-        work[frozenset(choices.of.get(turn, turn[:1]))] += _work(order, lasts, turn)
+        able, seconds = frozenset(choices.of.get(turn, turn[:1])), _work(order, lasts, turn)
+        if seconds and begins is not None:
+            work[able] += seconds
+            begin = min(begins.begins[m] for m in order.resources[turn[0]].turns[turn[1]].members)
+            first[able] = min(first.get(able, begin), begin)
     bound = max([bound, *(_shared_work(order, lasts, one) for one in order.resources)])
     unions = list(work)
     for able in unions:  # the loop appends unions to the list
-        bound = max(bound, -(-sum(its for other, its in work.items() if other <= able) // len(able)))
+        within = [other for other in work if other <= able]
+        bound = max(bound, min(first[one] for one in within) - (-sum(work[one] for one in within) // len(able)))
         more = dict.fromkeys(able | other for other in work if len(able) > 1 < len(other) and able & other)
         unions += [one for one in more if one not in unions][: max(MOST_UNIONS - len(unions), 0)]
     return bound
