@@ -46,9 +46,9 @@ from worlds.scenes import scene
 from worlds.slices import Slice
 from worlds.walking import cost, faults
 
-SECONDS, CPU, COMPARING = 3.0, 4.0, 30.0
-"""Time limit of a call in seconds; CPU seconds after which a call counts as endless; the same for a comparison with exhaustive
-searches."""
+SECONDS, CPU, PROVING, COMPARING = 3.0, 4.0, 15.0, 30.0
+"""Time limit of a call in seconds; CPU seconds after which a call counts as endless; the same for a search for one certificate,
+whose number of tests is limited instead of its time, and for a comparison with exhaustive searches."""
 MOST = 5_000
 """Maximum number of nodes of the exhaustive search."""
 OPTIMAL, PAPER, STRICT, EXPORTS, EXECUTIONS, LESSONS, READERS, CERTIFICATES, RECOGNITION = 3, 2, 3, 8, 6, 8, 250, 4, 8
@@ -557,7 +557,7 @@ class Judge:
     def proofs_of(self, problem: Problem, kind: str, known: Certificate | None = None) -> None:
         """Search for a certificate of one kind, and judge it unless it is the known certificate."""
         mode = f"proofs by {kind}"
-        one = self.call(mode, partial(certificate, kind, problem))
+        one = self.call(mode, partial(certificate, kind, problem), PROVING)
         if mode not in self.found.status and (one is None or one != known):
             self.compared(mode, partial(self.proof, problem, mode, one))
 

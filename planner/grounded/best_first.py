@@ -132,7 +132,7 @@ def search(
         return flat
     if found:
         found(flat.plan)
-    with suppress(MemoryError):  # otherwise the plan isn't shortened
+    with suppress(MemoryError, OutOfTimeError):  # otherwise the plan isn't shortened
         work = SHORTEN + STEP * min(len(flat.plan), STEPS) + flat.work // SHORTENING
         return replace(flat, plan=tuple(shorter(task, flat.plan, work, deadline)))
     return flat
@@ -164,6 +164,8 @@ class Search:
                 self._result = end.value
             except OutOfTimeError:
                 self._result = self._ended(Status.GAVE_UP, "the time limit came first")
+            except MemoryError:
+                self._result = replace(self._ended(Status.GAVE_UP), reason=OUT_OF_MEMORY)
         return self._result
 
     def _ended(self, status: Status, why: str | None = None, plan: Sequence[int] = ()) -> Flat:
@@ -178,7 +180,7 @@ class Search:
         if begun is None:
             return self._ended(Status.UNSOLVABLE, "the goal can't be reached even if nothing ever ceases to hold")
         novelty = Novelty(task, evaluate, begun.work, landmarks(task, self.deadline), self.counts)
-        greedy = Greedy(task, evaluate, ahead(task, self.deadline), self.counts)
+        greedy = Greedy(task, evaluate, ahead(task, self.deadline), begun.work, self.counts)
         going: dict[SearchOrder, Iterator[int]] = {order: explore(task, order) for order in (novelty, greedy)}
         spent: dict[SearchOrder, int] = dict.fromkeys(going, 0)
         del novelty, greedy  # releases the memory of an order that runs out of memory

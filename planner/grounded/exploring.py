@@ -32,9 +32,10 @@ class Candidate(NamedTuple):
 class SearchOrder(Protocol):
     """Interface of a search order.
 
-    `work` counts the bits processed by relaxed plans; the turn of a search order ends when `work` reaches `turn`. `reached` maps
-    each state to the last accepted candidate. `bytes` is the memory of the search order without the states in `reached`. `best` is
-    the final state of the best plan. `best` is None if no plan was found.
+    `work` is the work of the search order in its own unit (in most orders, the bits processed by relaxed plans); the turn of a
+    search order ends when `work` reaches `turn`. `reached` maps each state to the last accepted candidate. `bytes` is the memory of
+    the search order without the states in `reached`. `best` is the final state of the best plan. `best` is None if no plan was
+    found.
     """
 
     reached: dict[int, Candidate]

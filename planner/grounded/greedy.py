@@ -4,8 +4,8 @@ The next candidates are successors of the state with the least h. The open list 
 applicable operators, and one queue with the preferred operators. A preferred operator is applicable and occurs in the relaxed
 plan. A new least h gives extra turns to the preferred operators and starts a lookahead.
 
-The search evaluates a state when the state is reached, and applies one operator at a time (Richter and Helmert, "Preferred
-operators and deferred evaluation in satisficing planning", ICAPS 2009).
+The search evaluates each reached state at once, but generates its successors one at a time. The preferred operators and the extra
+turns are described by Richter and Helmert, "Preferred operators and deferred evaluation in satisficing planning", ICAPS 2009.
 """
 
 from __future__ import annotations
@@ -27,10 +27,19 @@ Lookahead = Callable[[int, Sequence[int]], "tuple[int, list[int]]"]
 
 
 class Greedy:
-    """The search order by h_FF for a task; the search order adds its effort to `counts`."""
+    """The search order by h_FF for a task.
 
-    def __init__(self, task: Task, evaluate: Evaluate, lookahead: Lookahead, counts: Counts) -> None:
-        self.task, self.evaluate, self.lookahead, self.counts = task, evaluate, lookahead, counts
+    `relaxing` is the work that counts for a state from which the goal is unreachable. The search order adds its effort to `counts`.
+    """
+
+    def __init__(self, task: Task, evaluate: Evaluate, lookahead: Lookahead, relaxing: int, counts: Counts) -> None:
+        self.task, self.evaluate, self.lookahead, self.relaxing, self.counts = (
+            task,
+            evaluate,
+            lookahead,
+            relaxing,
+            counts,
+        )
         self.reached: dict[int, Candidate] = {}
         self.work, self.turn, self.bytes = 0, 1, 0
         self.open = OpenList[tuple[int, Iterator[int]]](2)
@@ -67,7 +76,7 @@ class Greedy:
         self.counts.evaluated += 1
         evaluation = self.evaluate(state)
         if evaluation is None:
-            self.work += self.turn
+            self.work += self.relaxing
             return
         self.counts.expanded += 1
         self.work += evaluation.work

@@ -1,4 +1,4 @@
-"""The relaxed-plan heuristic h_FF, which also yields the applicable and the preferred operators.
+"""The relaxed-plan heuristic h_FF, which also yields a relaxed plan and the applicable operators.
 
 A layer contains the bits that are reached at the same time. A relaxed operator is reached when its last required bit is
 reached. The cost of a bit is the sum of two parts: the cost of all repetitions of the cheapest operator that sets the bit, and
@@ -19,7 +19,7 @@ from collections.abc import Callable, Sequence
 from heapq import heappop, heappush
 from typing import NamedTuple, TypeAlias
 
-from confab.planner.grounded.amounts import AmountVector, Exact, Linear, pushes
+from confab.planner.grounded.amounts import AmountVector, Exact, Linear, Move, pushes
 from confab.planner.grounded.task import Task, bits_of
 
 MOST_TIMES = 1000
@@ -236,7 +236,7 @@ def _relaxed(task: Task) -> tuple[list[list[int]], list[list[int]], list[int], d
             for bit in bits if not compared.keys().isdisjoint(bits) else ():
                 if bit in compared:
                     difference, sign = compared[bit]
-                    repeated[difference, sign, _push(task, o, difference)].append(len(owners))
+                    repeated[difference, sign, _push(task, o, difference, sign)].append(len(owners))
                     needs.append(needs[o])
                     adds.append([bit])
                     owners.append(owners[o])
@@ -244,13 +244,22 @@ def _relaxed(task: Task) -> tuple[list[list[int]], list[list[int]], list[int], d
     return needs, adds, owners, repeated
 
 
-def _push(task: Task, relaxed: int, difference: Linear) -> Exact | None:
-    """Return the change of a difference by a relaxed operator, or None if the change depends on the state."""
+def _push(task: Task, relaxed: int, difference: Linear, sign: str) -> Exact | None:
+    """Return the greatest change of a difference by a relaxed operator, or None if the change depends on the state.
+
+    Other conditional changes by the same operator count if they help. Several such changes may have the required sum, although none
+    of them suffices. If the sign is "=", they may help in any direction, so that the change depends on the state.
+    """
     amounts, owner = task.amounts, task.owners[relaxed]
     assert amounts is not None
     own = sum(1 << bit for bit in task.needs[relaxed])
-    moves = [move for move in amounts.made(owner) if move.when & own == move.when] if owner >= 0 else []
-    found = pushes(moves, difference)
+    certain, others = list[Move](), list[Move]()
+    for move in amounts.made(owner) if owner >= 0 else ():
+        (certain if move.when & own == move.when else others).append(move)
+    alone = [(move, pushes([move], difference)) for move in others]
+    if sign == "=" and any(push is not False and push != 0 for _, push in alone):
+        return None
+    found = pushes(certain + [move for move, push in alone if push is None or push > 0], difference)
     return None if isinstance(found, bool) else found
 
 

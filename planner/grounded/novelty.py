@@ -52,7 +52,7 @@ class Novelty:
     """
 
     def __init__(self, task: Task, evaluate: Evaluate, relaxing: int, marks: int, counts: Counts) -> None:
-        self.task, self.evaluate, self.counts = task, evaluate, counts
+        self.task, self.evaluate, self.relaxing, self.counts = task, evaluate, relaxing, counts
         self.reached: dict[int, Candidate] = {}
         self.work, self.turn, self.bytes = 0, relaxing, 0
         self.open = OpenList[Progress]()
@@ -106,7 +106,7 @@ class Novelty:
             return place
         evaluation = self.evaluate(place.state)
         self.counts.evaluated += 1
-        self.work += self.turn
+        self.work += self.relaxing
         if evaluation is None:
             return None
         wanted = 0

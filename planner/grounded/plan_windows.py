@@ -445,6 +445,7 @@ class _Windows:
             derived=derived.renamed(small),
             change=change,
             describe=lambda operator: task.describe(operators[operator]),
+            barred=set(),
             _changes={},
         )
         return part, operators
@@ -468,6 +469,7 @@ class _Windows:
             adds=Grouped.of([task.adds[r] for r in rows]),
             change=lambda operator: task.changes_of(operators[operator]),
             describe=lambda operator: task.describe(operators[operator]),
+            barred=set(),
             amounts=replace(amounts, moves=lambda operator: of(operators[operator]), _moves={}),
             _changes={},
         )

@@ -32,7 +32,7 @@ from confab.reasoner.symbols import Symbol
 LEAST_STOPS, FEW = 4, 15
 """A plan with fewer than `LEAST_STOPS` stops is left as it is; a plan with fewer than `FEW` stops is varied with less work."""
 LEAST_WORK = 500_000
-"""Minimum work of varying the route of a plan with many stops."""
+"""Least work of varying the route of a plan with many stops."""
 STATES = 300
 """Maximum number of states that are expanded in the search for the connecting steps before a stop."""
 HOT, COLD = 0.5, 0.03
@@ -121,7 +121,10 @@ class _StopOrders:
         self.makeable, self.asked = 0, 0
         self._add_makers(task.adds.lists())
         self.siblings = self._siblings()
-        self.known = dict[tuple[int, int], "list[int] | None"]()
+        self.known = dict[tuple[int, int], list[int]]()
+        """Connecting steps, by the bits of a state that are told apart, and the stop."""
+        self.exact = dict[tuple[int, int], "list[int] | None"]()
+        """Results of searches for connecting steps, by the state and the stop."""
         self.factor = 1 + task.derived.effort // WAYS
 
     @property
@@ -243,11 +246,11 @@ class _StopOrders:
         if found is not None and (not checked or self.leads(state, found, wanted, stop)):
             return found
         exactly = (state if checked else seen, number)
-        if exactly not in self.known:
-            found = self.known[exactly] = self.searched(state, wanted, stop)
+        if exactly not in self.exact:
+            found = self.exact[exactly] = self.searched(state, wanted, stop)
             if found is not None:
                 self.known.setdefault((seen, number), found)
-        return self.known[exactly]
+        return self.exact[exactly]
 
     def arrived(self, state: int, wanted: int, stop: int | None) -> bool:
         """Return whether a state has the required bits, and a stop is applicable within the bounds of amounts."""

@@ -145,7 +145,8 @@ class Task:
         total, state = 0.0, self.initial
         for operator in plan:
             total += self.spent(state, operator)
-            state = (self.applied(state, operator) if self.prices else state) or state
+            after = self.applied(state, operator) if self.prices else state
+            state = state if after is None else after
         return total
 
     def applied(self, state: int, operator: int, follow: bool = True) -> int | None:

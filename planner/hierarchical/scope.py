@@ -112,7 +112,9 @@ class Scope:
         assert self.task is not None
         state = self.task.initial
         for operator in self.plan[:position]:
-            state = self.task.applied(state, operator) or state
+            after = self.task.applied(state, operator)
+            assert after is not None
+            state = after
         name = self.task.describe(self.plan[position])[:2]
         self.task.barred.update((state, o) for o in range(len(self.task)) if self.task.describe(o)[:2] == name)
 

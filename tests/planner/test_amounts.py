@@ -2,17 +2,22 @@
 
 from dataclasses import replace
 from fractions import Fraction
+from random import Random
 
 import pytest
 
 import confab
 from confab.planner.grounded.best_first import plan_level
+from confab.planner.grounded.grounding import ground
+from confab.planner.grounded.task import Task
 from confab.planner.plan import Limits, Outcome, Status
 from confab.planner.solve import Request, solve
 from confab.reasoner.amounts import Amount, Calculation, Measure, Quantity, bounds_written, meets, written
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse
 from confab.reasoner.symbols import (
+    FALSE,
+    TRUE,
     AmountEffect,
     AnyOf,
     Behavior,
@@ -25,7 +30,8 @@ from confab.reasoner.symbols import (
     ValueEffect,
     Witness,
 )
-from worlds.writing import becomes, has, world
+from worlds.agreement import solvable
+from worlds.writing import becomes, behavior, has, world
 
 JUG, CUP = Parameter("?j", "Jug"), Parameter("?c", "Cup")
 TEA = Amount("TEA", ("?j",))
@@ -223,8 +229,8 @@ def test_an_assignment_of_too_small_an_amount_is_no_achiever() -> None:
     problem = pouring("0.5", 1, Fraction(1), refill=None)
     rinse = Behavior("RINSE", 2, (JUG,), amounts=(AmountEffect("TEA", ("?j",), "assign", Fraction(0)),))
     fill = replace(rinse, name="FILL", amounts=(AmountEffect("TEA", ("?j",), "assign", Fraction(2)),))
-    for behavior, status in ((rinse, Status.UNSOLVABLE), (fill, Status.SOLVED)):
-        domain = replace(problem.domain, behaviors={**problem.domain.behaviors, behavior.name: behavior})
+    for one, status in ((rinse, Status.UNSOLVABLE), (fill, Status.SOLVED)):
+        domain = replace(problem.domain, behaviors={**problem.domain.behaviors, one.name: one})
         outcome = plan_level(replace(problem, domain=domain), 2)
         assert outcome.status is status
         assert outcome.search[2].expanded == 0 or outcome.plan is not None
@@ -242,3 +248,72 @@ def test_an_amount_that_changes_under_a_condition_is_not_counted_as_consumed() -
     task = """(define (problem p) (:domain shelf) (:objects b0 b1 - book)
       (:init (out b0) (out b1) (= (free) 1)) (:goal (and (there b0) (there b1))))"""
     assert plan_level(imported(parse(domain, task)).problem).status is Status.SOLVED
+
+
+def working(random: Random | None = None) -> Problem:
+    """A behaviour that decreases the load of a box, and increases it for each lamp that is on; lamps can be switched off."""
+    lamps = [f"LAMP{number}" for number in range(2 if random is None else random.randint(2, 3))]
+    box, load = Parameter("?b", "Box"), Quantity()
+    less = AmountEffect("LOAD", ("?b",), "decrease", Fraction(1 if random is None else random.randint(1, 2)))
+    more = [AmountEffect("LOAD", ("?b",), "increase", Fraction(1), (has(lamp, "?b", TRUE),)) for lamp in lamps]
+    if random is not None:
+        load = Quantity(least=Fraction(-3), most=Fraction(3))
+        more = [
+            replace(
+                effect,
+                operation=random.choice(("increase", "increase", "decrease")),
+                when=(has(random.choice(lamps), "?b", random.choice((TRUE, TRUE, FALSE))),),
+            )
+            for effect in more * 2
+        ]
+    off = [behavior(f"OFF{lamp}", 1, "?b:Box", [has(lamp, "?b", TRUE)], [becomes(lamp, "?b", FALSE)]) for lamp in lamps]
+    wanted = ">=1" if random is None else random.choice((">=", "<=")) + str(random.randint(-2, 3))
+    return world(
+        [
+            SituationType("LOAD", ("Box",), "LOAD", quantity=load),
+            *(SituationType(lamp, ("Box",), "Truth", boolean=True) for lamp in lamps),
+        ],
+        [Behavior("WORK", 1, (box,), amounts=(less, *more)), *off],
+        {"Box": ("box",)},
+        {
+            "LOAD box": "0",
+            **{f"{lamp} box": TRUE if random is None else random.choice((TRUE, FALSE)) for lamp in lamps},
+        },
+        {"LOAD box": wanted},
+    )
+
+
+@pytest.mark.parametrize("mode", ["guarded", "paper", "optimal"])
+def test_several_conditional_changes_of_one_amount_reach_a_goal_that_none_of_them_reaches(mode: str) -> None:
+    outcome = solve(Request(working(), mode))
+    assert outcome.status is Status.SOLVED and outcome.plan is not None
+    assert [step.behavior for step in outcome.plan.steps] == ["WORK"]
+
+
+def test_random_conditional_changes_of_amounts_have_the_answers_of_exhaustive_search() -> None:
+    answers = []
+    for seed in range(300):
+        problem = working(Random(seed))
+        answers.append(solvable(problem, most=3_000))
+        assert (plan_level(problem).status is Status.SOLVED) == answers[-1], seed
+    assert answers.count(True) > 50 and answers.count(False) > 50
+
+
+def test_a_price_is_read_in_the_state_before_its_step_even_if_nothing_is_true_there() -> None:
+    load, done = Amount("LOAD", ("?b",)), SituationType("DONE", ("Box",), "Truth", boolean=True)
+    box = Parameter("?b", "Box")
+    problem = world(
+        [SituationType("LOAD", ("Box",), "LOAD", quantity=Quantity(least=Fraction(0), most=Fraction(9))), done],
+        [
+            Behavior("UP", 1, (box,), amounts=(AmountEffect("LOAD", ("?b",), "increase", Fraction(1)),)),
+            Behavior("DOWN", 1, (box,), amounts=(AmountEffect("LOAD", ("?b",), "decrease", Fraction(1)),)),
+            Behavior("PAY", 1, (box,), effects=(becomes("DONE", "?b", TRUE),), price=load),
+        ],
+        {"Box": ("box",)},
+        {"LOAD box": "0", "DONE box": FALSE},
+        {"DONE box": TRUE},
+    )
+    task = ground(problem)
+    assert isinstance(task, Task)
+    plan = task.operators_of([(name, ("box",)) for name in ("UP", "DOWN", "PAY")])
+    assert plan is not None and task.cost_of(plan) == 2.0

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import confab
-from confab.planner.grounded import reachability
+from confab.planner.grounded import best_first, reachability
 from confab.planner.grounded.best_first import Search, plan_level, search
 from confab.planner.grounded.exploring import SearchOrder, explore, path_to
 from confab.planner.grounded.greedy import Greedy
@@ -31,6 +31,7 @@ from confab.planner.hierarchical.call import Compiled
 from confab.planner.plan import OUT_OF_MEMORY, Counts, Limits, Plan, Reason, Status, UngroundableError
 from confab.planner.solve import MODES, Request, solve
 from confab.planner.validation import validate
+from confab.reasoner.limits import OutOfTimeError
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse
 from confab.reasoner.symbols import TRUE, Problem, Symbol
@@ -158,7 +159,7 @@ def test_steps_that_the_goal_does_not_need_are_dropped() -> None:
 
 ORDERS: dict[str, Callable[[Task], SearchOrder]] = {
     "novelty": lambda task: Novelty(task, heuristic(task), 1, landmarks(task), Counts()),
-    "h_FF": lambda task: Greedy(task, heuristic(task), ahead(task), Counts()),
+    "h_FF": lambda task: Greedy(task, heuristic(task), ahead(task), 1, Counts()),
     "cost": lambda task: Cheapest(task, nothing, math.inf, Counts()),
 }
 
@@ -382,7 +383,7 @@ def test_a_problem_of_one_level_is_planned_as_a_whole_unless_it_is_too_large(
     outcome = fast.plan(lift)  # without grounding
     assert outcome.plan is not None
     assert validate(lift, outcome.plan) == []
-    monkeypatch.setattr(fast, "TRIALS", 0)
+    monkeypatch.setattr(fast, "TRIALS_AT_FIRST", 0)
     with pytest.raises(AssertionError, match="goals in series"):
         fast.plan(lift)
 
@@ -435,3 +436,26 @@ def test_a_task_of_one_level_that_is_planned_as_a_whole_is_not_compiled(monkeypa
     monkeypatch.setattr(fast, "compiled", compiled)
     outcome = solve(Request(imported(parse(TURNED, CORNERS.replace("(off c a b)", "(lit a)"))).problem))
     assert outcome.status is Status.SOLVED and outcome.plan is not None and len(outcome.plan.steps) == 2
+
+
+def test_a_search_without_memory_for_its_heuristic_gives_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none(task: Task) -> Evaluate:
+        raise MemoryError
+
+    task = ground(corridor(3))
+    assert isinstance(task, Task)
+    monkeypatch.setattr(best_first, "heuristic", none)
+    going = Search(task)
+    for _ in range(2):
+        found = going.go_on()
+        assert found.status is Status.GAVE_UP and found.reason is OUT_OF_MEMORY
+
+
+def test_a_plan_is_kept_if_the_time_ends_while_it_is_shortened(monkeypatch: pytest.MonkeyPatch) -> None:
+    def late(*_: object) -> list[int]:
+        raise OutOfTimeError("shortening", 1.0)
+
+    task = ground(corridor(3))
+    assert isinstance(task, Task)
+    monkeypatch.setattr(best_first, "shorter", late)
+    assert search(task).status is Status.SOLVED

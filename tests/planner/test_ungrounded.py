@@ -121,6 +121,7 @@ def test_planning_goes_on_from_the_initial_state_after_a_search_that_found_nothi
 ) -> None:
     problem = mixing(105)  # more than a million quantified behaviours
     monkeypatch.setattr(planner, "TRIALS", 4_000)
+    monkeypatch.setattr(planner, "TRIALS_AT_FIRST", 500)
     outcome = solve(Request(problem))
     assert outcome.plan is not None
     assert not validate(problem, outcome.plan)
