@@ -10,7 +10,7 @@ from typing import TypeAlias
 import pyoxigraph as ox
 
 from confab.planner.grounded.grounding import ground
-from confab.planner.grounded.plan_windows import regrouped, shortened
+from confab.planner.grounded.plan_windows import regrouped, without_superfluous_steps
 from confab.planner.grounded.task import Task
 from confab.planner.paper.transitions import Model, Values
 from confab.planner.plan import Plan, Step, UngroundableError
@@ -158,5 +158,5 @@ def _regrouped(problem: Problem, level: int, plan: list[Ground], shorten: bool) 
     if chosen is None:
         return plan
     if shorten and task.carried_out(task.initial, chosen)[0] & task.goal == task.goal:
-        chosen = shortened(task, chosen)
+        chosen = without_superfluous_steps(task, chosen)
     return [task.describe(operator)[:2] for operator in regrouped(task, chosen)]

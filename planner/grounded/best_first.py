@@ -22,7 +22,7 @@ from confab.planner.grounded.greedy import Greedy
 from confab.planner.grounded.grounding import MOST_ROWS, ground
 from confab.planner.grounded.hff import heuristic
 from confab.planner.grounded.landmarks import landmarks
-from confab.planner.grounded.lookahead import ahead
+from confab.planner.grounded.lookahead import lookahead
 from confab.planner.grounded.novelty import Novelty
 from confab.planner.grounded.plan_windows import shorter
 from confab.planner.grounded.shortest import least
@@ -31,10 +31,11 @@ from confab.planner.plan import OUT_OF_MEMORY, Counts, Limits, Outcome, Plan, Re
 from confab.reasoner.limits import OutOfTimeError
 from confab.reasoner.symbols import Problem, State
 
-SHORTEN, STEP, STEPS, SHORTENING = 200_000, 1_000, 400, 50
+BASE_WORK, STEP_WORK, STEPS_COUNTED, SEARCH_SHARE = 200_000, 1_000, 400, 50
 """Constants that determine the maximum work of shortening a plan; the unit is one examined operator.
 
-The work is the sum of `SHORTEN`, `STEP` for each of the first `STEPS` steps, and the work of the search divided by `SHORTENING`.
+The work is the sum of `BASE_WORK`, `STEP_WORK` for each of the first `STEPS_COUNTED` steps, and the work of the search divided by
+`SEARCH_SHARE`.
 """
 
 
@@ -133,7 +134,7 @@ def search(
     if found:
         found(flat.plan)
     with suppress(MemoryError, OutOfTimeError):  # otherwise the plan isn't shortened
-        work = SHORTEN + STEP * min(len(flat.plan), STEPS) + flat.work // SHORTENING
+        work = BASE_WORK + STEP_WORK * min(len(flat.plan), STEPS_COUNTED) + flat.work // SEARCH_SHARE
         return replace(flat, plan=tuple(shorter(task, flat.plan, work, deadline)))
     return flat
 
@@ -180,7 +181,7 @@ class Search:
         if begun is None:
             return self._ended(Status.UNSOLVABLE, "the goal can't be reached even if nothing ever ceases to hold")
         novelty = Novelty(task, evaluate, begun.work, landmarks(task, self.deadline), self.counts)
-        greedy = Greedy(task, evaluate, ahead(task, self.deadline), begun.work, self.counts)
+        greedy = Greedy(task, evaluate, lookahead(task, self.deadline), begun.work, self.counts)
         going: dict[SearchOrder, Iterator[int]] = {order: explore(task, order) for order in (novelty, greedy)}
         spent: dict[SearchOrder, int] = dict.fromkeys(going, 0)
         del novelty, greedy  # releases the memory of an order that runs out of memory

@@ -101,7 +101,7 @@ class OpenList(Generic[Entry]):
         self.number += 1
         heapq.heappush(self.queues[queue], (rank, self.number, entry))
 
-    def first(self) -> tuple[int, Entry] | None:
+    def draw(self) -> tuple[int, Entry] | None:
         """Return the number of the queue that is next in turn, and the queue's first entry, or None if all queues are empty."""
         filled = [which for which, queue in enumerate(self.queues) if queue]
         if not filled:

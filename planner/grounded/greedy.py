@@ -44,17 +44,17 @@ class Greedy:
         self.work, self.turn, self.bytes = 0, 1, 0
         self.open = OpenList[tuple[int, Iterator[int]]](2)
         self.least: int | None = None
-        self.ahead: Candidate | None = None
+        self.jump: Candidate | None = None
         self.best: int | None = None
 
     def candidates(self) -> Iterator[Candidate]:
         """Yield states reached by lookaheads, and states reached by one operator from the state with the least h."""
         while self.best is None:
-            if self.ahead is not None:
-                candidate, self.ahead = self.ahead, None
+            if self.jump is not None:
+                candidate, self.jump = self.jump, None
                 yield candidate
                 continue
-            drawn = self.open.first()
+            drawn = self.open.draw()
             if drawn is None:
                 return
             queue, (state, operators) = drawn
@@ -92,4 +92,4 @@ class Greedy:
             self.open.turns[PREFERRED] -= BOOST
             after, path = self.lookahead(state, evaluation.plan)
             if len(path) > 1:
-                self.ahead = Candidate(state, tuple(path), after, 0.0)
+                self.jump = Candidate(state, tuple(path), after, 0.0)

@@ -20,7 +20,7 @@ StatePath: TypeAlias = "tuple[int, list[int]]"
 """A state, and the operators on the path to this state."""
 
 
-def ahead(task: Task, deadline: float | None = None) -> Callable[[int, Sequence[int]], StatePath]:
+def lookahead(task: Task, deadline: float | None = None) -> Callable[[int, Sequence[int]], StatePath]:
     """Return a function that executes a relaxed plan from a state as far as possible.
 
     The function returns the final state and the executed operators. If no operator of the plan is applicable, the function

@@ -10,7 +10,7 @@ from confab.reasoner.language import is_variable
 from confab.reasoner.symbols import Parameter, Problem, RelationCondition, SituationType, ValueCondition, ValueEffect
 
 
-def lifted(problem: Problem, level: int) -> Problem:
+def merged(problem: Problem, level: int) -> Problem:
     """Return a problem in which conditional effects of the same shape are one effect over the rows of an auxiliary relation.
 
     In a problem, an effect on every member of a class is a separate effect for each individual. The model of a cube

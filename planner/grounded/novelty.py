@@ -1,9 +1,9 @@
 """The search order by novelty: states with a new fact come first.
 
-An open goal is a goal that doesn't hold. A landmark is open if the path to the state hasn't reached the landmark. The distance
+An open goal is a goal that doesn't hold. A landmark is open if the path to the state hasn't reached the landmark. The progress
 of a state is a pair of numbers: the number of open goals and landmarks, and the number of reached facts of the last relaxed
 plan. A new relaxed plan is computed after a goal or landmark is reached. A state is novel if it has a fact that no earlier
-state with the same distance had. The test for novelty is one operation on two integers. The open list is sorted by novelty,
+state with the same progress had. The test for novelty is one operation on two integers. The open list is sorted by novelty,
 then by the number of open goals and landmarks. Among states of the same rank, the newest state comes first.
 
 Relaxed plans are computed only for expanded states that reach an open goal or landmark. Therefore the order ranks a hundred
@@ -30,8 +30,8 @@ CHILD, VISIT = 20, 2
 """
 
 
-class Progress(NamedTuple):
-    """The progress of a state.
+class Node(NamedTuple):
+    """A node of the search: a state with its progress.
 
     `open` is the number of open goals and landmarks, and `unmet` is the mask of open landmarks. `wanted` is the mask of the
     relaxed plan's facts; -1 if the relaxed plan isn't computed. `met` is the mask of the reached facts of the relaxed plan.
@@ -55,22 +55,22 @@ class Novelty:
         self.task, self.evaluate, self.relaxing, self.counts = task, evaluate, relaxing, counts
         self.reached: dict[int, Candidate] = {}
         self.work, self.turn, self.bytes = 0, relaxing, 0
-        self.open = OpenList[Progress]()
+        self.open = OpenList[Node]()
         self.best: int | None = None
         above = -1 << task.size if task.amounts else 0  # bits above the facts, for amounts
-        self.known: defaultdict[tuple[int, int], int] = defaultdict(lambda: above)  # reached facts, by distance
-        self.begin = Progress(task.initial, task.size + 1, marks & ~task.goal, 0, 0)
+        self.seen: defaultdict[tuple[int, int], int] = defaultdict(lambda: above)  # reached facts, by progress
+        self.parent = Node(task.initial, task.size + 1, marks & ~task.goal, 0, 0)
 
     def candidates(self) -> Iterator[Candidate]:
         """Yield the successors of the most novel states."""
         task, plain = self.task, dict[int, "tuple[int, int] | None"]()
         child = CHILD + task.size // 50 + task.derived.effort
-        while (drawn := self.open.first()) is not None:
+        while (drawn := self.open.draw()) is not None:
             self.open.drop(0)
-            place = self.relaxed(drawn[1])
-            if place is None:
+            node = self.relaxed(drawn[1])
+            if node is None:
                 continue
-            self.begin, state = place, place.state
+            self.parent, state = node, node.state
             operators, visited = task.applicable(state)
             self.work += child * len(operators) + VISIT * visited
             self.counts.generated += len(operators)
@@ -86,25 +86,25 @@ class Novelty:
 
     def put(self, candidate: Candidate) -> None:
         """Rank a newly reached state by its novel facts."""
-        state, begin = candidate.state, self.begin
-        missing, unmet = self.task.goal & ~state, begin.unmet & ~state
+        state, parent = candidate.state, self.parent
+        missing, unmet = self.task.goal & ~state, parent.unmet & ~state
         if not missing:
             self.best = state
             return
         open_ = missing.bit_count() + unmet.bit_count()
-        place = Progress(state, open_, unmet, -1, 0)
-        if open_ >= begin.open:
-            place = Progress(state, open_, unmet, begin.wanted, begin.met | state & begin.wanted)
-        distance = open_, place.met.bit_count()
-        old = self.known[distance]
-        self.known[distance] = old | state
-        self.open.push((not state & ~old, open_, -len(self.reached)), place)
+        node = Node(state, open_, unmet, -1, 0)
+        if open_ >= parent.open:
+            node = Node(state, open_, unmet, parent.wanted, parent.met | state & parent.wanted)
+        progress = open_, node.met.bit_count()
+        old = self.seen[progress]
+        self.seen[progress] = old | state
+        self.open.push((not state & ~old, open_, -len(self.reached)), node)
 
-    def relaxed(self, place: Progress) -> Progress | None:
-        """Return the progress of a state with the facts of a relaxed plan, or None if the goal is unreachable."""
-        if place.wanted >= 0:
-            return place
-        evaluation = self.evaluate(place.state)
+    def relaxed(self, node: Node) -> Node | None:
+        """Return a node with the facts of a relaxed plan, or None if the goal is unreachable."""
+        if node.wanted >= 0:
+            return node
+        evaluation = self.evaluate(node.state)
         self.counts.evaluated += 1
         self.work += self.relaxing
         if evaluation is None:
@@ -113,7 +113,7 @@ class Novelty:
         for operator in evaluation.plan:
             for _, _, set_ in self.task.changes_of(operator)[1]:
                 wanted |= set_
-        return place._replace(wanted=wanted & ~place.state)
+        return node._replace(wanted=wanted & ~node.state)
 
 
 def _plain(task: Task, operator: int) -> tuple[int, int] | None:

@@ -35,7 +35,7 @@ from confab.planner.grounded.amounts import Amounts, Linear
 from confab.planner.grounded.hff import cost_left
 from confab.planner.grounded.joins import Ints
 from confab.planner.grounded.routes import rerouted
-from confab.planner.grounded.shortest import LowerBound, shortest, ways
+from confab.planner.grounded.shortest import Estimate, each_goal_alone, shortest
 from confab.planner.grounded.task import BitChange, Grouped, Task, bits_of
 from confab.planner.plan_costs import TRIFLE
 
@@ -85,10 +85,10 @@ def shorter(
     if task.prices or len(set(task.costs)) > 1 or not any(task.costs):
         prices = {operator: price.plus(Linear((), Fraction(TRIFLE))) for operator, price in task.prices.items()}
         task = replace(task, costs=[cost + TRIFLE for cost in task.costs], prices=prices)
-    best = cheaper(task, plan, shortened(task, plan, deadline))
+    best = cheaper(task, plan, without_superfluous_steps(task, plan, deadline))
     work -= len(plan) ** 2 // 2  # about the number of replayed operators
     if len(best) <= STEPS:
-        best, proved = cheapest(task, best, work, deadline)
+        best, proved = proved_cheapest(task, best, work, deadline)
         if proved:
             return best
     if routes and task.level == task.problem.domain.levels[-1]:
@@ -101,7 +101,7 @@ def shorter(
             best = windows.pass_over(best, size)
             best = cheaper(task, best, windows.pass_over(regrouped(task, best), size))
         if task.cost_of(best) < before:
-            best = cheaper(task, best, shortened(task, best, deadline))
+            best = cheaper(task, best, without_superfluous_steps(task, best, deadline))
             windows.work -= len(best) ** 2 // 2
         if task.cost_of(best) == before or windows.over:
             return cheaper(task, windows.restarted(best), plan)
@@ -112,19 +112,19 @@ def cheaper(task: Task, plan: Sequence[int], other: Sequence[int]) -> list[int]:
     return list(other if task.cost_of(other) < task.cost_of(plan) else plan)
 
 
-def cheapest(task: Task, plan: list[int], work: int, deadline: float | None) -> tuple[list[int], bool]:
+def proved_cheapest(task: Task, plan: list[int], work: int, deadline: float | None) -> tuple[list[int], bool]:
     """Return a plan, and whether it is proved to be a cheapest plan.
 
     The plan is the given plan if a search of few states finds no cheaper plan.
     """
     looked = (1 + LOOK * len(task.applicable(task.initial)[0])) * (1 + task.derived.effort // WAYS)
     cost = task.cost_of(plan)
-    found = shortest(task, ways(task), cost, min(STATES, work // looked), deadline)
+    found = shortest(task, each_goal_alone(task), cost, min(STATES, work // looked), deadline)
     best = plan if found.plan is None else list(found.plan)
     return best, found.bound >= task.cost_of(best)
 
 
-def shortened(task: Task, plan: Sequence[int], deadline: float | None = None) -> list[int]:
+def without_superfluous_steps(task: Task, plan: Sequence[int], deadline: float | None = None) -> list[int]:
     """Return a plan without the steps that neither the goal nor a remaining step requires.
 
     In a very long plan, the function tests only the first steps.
@@ -304,24 +304,24 @@ class _Windows:
         """
         task, best, operators = self.task, plan, max(len(self.task.owners), 1)
         following = 1 + task.derived.effort // WAYS
-        for bound, each, weight, cut in (cost_left, operators, WEIGHT, self.cut), (ways, RANKED, 1, 1.0):
+        for bound, each, weight, cut in (cost_left, operators, WEIGHT, self.cut), (each_goal_alone, RANKED, 1, 1.0):
             most = self.work // (operators * following)
             if self.over or most < len(plan) * len(task.applicable(task.initial)[0]):
                 break
             with suppress(MemoryError):
                 known = self.work // (each * following)
                 found = self.search(task, task.cost_of(best), known, bound(task), each, weight, cut)
-                best = best if found is None else shortened(task, found, self.deadline)
+                best = best if found is None else without_superfluous_steps(task, found, self.deadline)
         return best
 
     def search(
-        self, task: Task, upper: float, most: int, bound: LowerBound, each: int, weight: int = 1, cut: float = 1.0
+        self, task: Task, upper: float, most: int, bound: Estimate, each: int, weight: int = 1, cut: float = 1.0
     ) -> list[int] | None:
         """Search for a plan cheaper than `upper` by A*, with the work `each` for a state.
 
         States whose cost plus `cut` times the estimate reaches `upper` are dropped.
         """
-        found = shortest(task, bound, upper, deadline=self.deadline, known=most, weight=weight, cut=cut)
+        found = shortest(task, bound, upper, deadline=self.deadline, most_reached=most, weight=weight, cut=cut)
         self.work -= len(found.states) * each
         return None if found.plan is None else list(found.plan)
 

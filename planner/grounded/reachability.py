@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from confab.planner.grounded.amounts import AmountTable
 from confab.planner.grounded.formulas import Formulas
 from confab.planner.grounded.joins import Ints, JoinTable, pack
-from confab.planner.grounded.merged_effects import lifted
+from confab.planner.grounded.merged_effects import merged
 from confab.planner.grounded.schemas import Schema, TablePattern, rules_apart, schemas
 from confab.planner.grounded.separation import in_parts
 from confab.reasoner.language import mentions
@@ -62,7 +62,7 @@ class Reached:
     def __init__(
         self, problem: Problem, level: int, initial: State, most: int, deadline: float | None, apart: bool = False
     ) -> None:
-        given, problem = problem, lifted(problem, level)
+        given, problem = problem, merged(problem, level)
         self.together = problem.relations.keys() - given.relations.keys()
         self.problem, self.level, self.most, self.deadline = problem, level, most, deadline
         known = (s for s in problem.domain.situations.values() if s.level <= level and s.quantity is None)

@@ -67,7 +67,7 @@ def rerouted(task: Task, plan: Sequence[int], work: int, deadline: float | None 
     work = min(max(work * 3 // 4, LEAST_WORK), work * stops // FEW)
     routes = _StopOrders(task, served, work, deadline)
     best = now = routes.fewest_stops(plan)
-    moves = _Moves(task, routes.served, plan)
+    moves = _RouteChanges(task, routes.served, plan)
     random, mean = moves.random, now.costs[-1] / max(len(now.stops), 1)
     improved = work
     while not routes.over and now.stops and improved - routes.work < work // PATIENCE:
@@ -311,7 +311,7 @@ class _StopOrders:
         return sorted({self.task.owners[row] for row in rows} - {-1})
 
 
-class _Moves:
+class _RouteChanges:
     """Random changes of the stops of a route.
 
     `names` contains the individuals of each step of the given plan, and `symbols` the symbol of a goal that a stop changes.

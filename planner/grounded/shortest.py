@@ -24,7 +24,8 @@ from confab.planner.grounded.exploring import Candidate, OpenList, explore, path
 from confab.planner.grounded.task import Task, bits_of
 from confab.planner.plan import Counts
 
-LowerBound: TypeAlias = "Callable[[int], float]"
+Estimate: TypeAlias = "Callable[[int], float]"
+"""Function of a state that returns an estimate of the remaining cost; if it is a lower bound, A* finds cheapest plans."""
 
 
 @dataclass(frozen=True)
@@ -45,14 +46,14 @@ def nothing(state: int) -> float:
     return 0.0
 
 
-class Cheapest:
+class AStar:
     """The search order of A* by a bound on the remaining cost.
 
     `lower` is the proved lower bound on the cost of a plan. The search order adds its effort to `counts`.
     """
 
     def __init__(
-        self, task: Task, bound: LowerBound, upper: float, counts: Counts, weight: int = 1, cut: float = 1.0
+        self, task: Task, bound: Estimate, upper: float, counts: Counts, weight: int = 1, cut: float = 1.0
     ) -> None:
         self.task, self.bound, self.upper, self.weight, self.cut, self.counts = task, bound, upper, weight, cut, counts
         self.reached: dict[int, Candidate] = {}
@@ -63,7 +64,7 @@ class Cheapest:
     def candidates(self) -> Iterator[Candidate]:
         """Yield the successors of the states with the least f, until no cheaper plan is possible."""
         task, costs, priced = self.task, self.task.costs, bool(self.task.prices)
-        while (drawn := self.open.first()) is not None:
+        while (drawn := self.open.draw()) is not None:
             self.open.drop(0)
             h, (_, _, state, cost) = drawn[1]
             if cost > self.reached[state].cost or cost + self.cut * h >= self.upper:
@@ -92,12 +93,12 @@ class Cheapest:
 
 def shortest(
     task: Task,
-    bound: LowerBound = nothing,
+    bound: Estimate = nothing,
     upper: float = math.inf,
-    most: int = 1_000_000,
+    most_expanded: int = 1_000_000,
     deadline: float | None = None,
     counts: Counts | None = None,
-    known: float = math.inf,
+    most_reached: float = math.inf,
     weight: int = 1,
     cut: float = 1.0,
 ) -> Shortest:
@@ -110,31 +111,35 @@ def shortest(
     task : Task
     bound : function of a state
     upper : float
-    most : int
+    most_expanded : int
         Maximum number of expansions.
     deadline : float, optional
         The deadline on the clock of `time.perf_counter`.
     counts : Counts, optional
         The counts to which the search adds the generated and the expanded states.
-    known : float
+    most_reached : float
         Maximum number of states reached.
     weight : int
         Weight of h in f. With a weight above 1, the search is faster, but the plan may cost more and the bound is meaningless.
     cut : float
         Weight of h when states are dropped; below 1 if h may exceed the remaining cost.
     """
-    order = Cheapest(task, bound, upper, counts or Counts(), weight, cut)
+    order = AStar(task, bound, upper, counts or Counts(), weight, cut)
     expanded, lower = 0, None
     for work in explore(task, order):
         expanded += work
-        if expanded > most or len(order.reached) > known or (deadline is not None and perf_counter() > deadline):
+        if (
+            expanded > most_expanded
+            or len(order.reached) > most_reached
+            or (deadline is not None and perf_counter() > deadline)
+        ):
             lower = order.lower
             break
     plan = None if order.best is None else tuple(path_to(order.reached, order.best))
     return Shortest(order.upper if lower is None else lower, plan, order.reached)
 
 
-def ways(task: Task) -> LowerBound:
+def each_goal_alone(task: Task) -> Estimate:
     """Return a lower bound on the cost of a plan: the sum, over all goals, of the least cost of achieving the goal alone.
 
     Each operator counts for only one symbol. Therefore no plan is cheaper than the bound.
@@ -180,7 +185,7 @@ def ways(task: Task) -> LowerBound:
 
 def least(task: Task) -> float | None:
     """Return the lower bound `ways` on the cost of every plan, or None if the bound is 0 or all operators cost the same."""
-    return (ways(task)(task.initial) if len(set(task.costs)) > 1 else 0.0) or None
+    return (each_goal_alone(task)(task.initial) if len(set(task.costs)) > 1 else 0.0) or None
 
 
 def _steps(task: Task, symbol: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:

@@ -19,7 +19,7 @@ from dataclasses import replace
 from time import perf_counter
 
 from confab.planner.grounded.grounding import ground
-from confab.planner.grounded.shortest import LowerBound, shortest, ways
+from confab.planner.grounded.shortest import Estimate, each_goal_alone, shortest
 from confab.planner.grounded.task import Task
 from confab.planner.hierarchical.planner import SEARCHING, Compiled, compiled
 from confab.planner.hierarchical.planner import plan as hierarchical_plan
@@ -101,7 +101,7 @@ def _proved(problem: Problem, best: Outcome, limits: Limits, deadline: float | N
     lower = 0.0
     half = None if deadline is None else (perf_counter() + deadline) / 2
     for bound, most, until in (
-        (ways(task), limits.expansions, half),
+        (each_goal_alone(task), limits.expansions, half),
         (lm_cut(task, deadline), limits.expansions, deadline),
     ):
         found = shortest(task, bound, upper, most, until, best.search.get(level))
@@ -113,7 +113,7 @@ def _proved(problem: Problem, best: Outcome, limits: Limits, deadline: float | N
     return lower, None
 
 
-def lm_cut(task: Task, deadline: float | None = None) -> LowerBound:
+def lm_cut(task: Task, deadline: float | None = None) -> Estimate:
     """Return the LM-cut heuristic of a task as a function of a state.
 
     After the deadline, the heuristic is the cost of the cuts found so far; this cost is also a lower bound. The computation

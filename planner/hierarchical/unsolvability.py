@@ -256,7 +256,7 @@ def exhausted(task: Task, most: int, deadline: float | None = None) -> Reason | 
     """
     from confab.planner.grounded.shortest import shortest
 
-    found = shortest(task, most=most, deadline=deadline, known=most)
+    found = shortest(task, most_expanded=most, deadline=deadline, most_reached=most)
     if found.plan is not None and found.bound >= task.cost_of(found.plan):
         return Plan(task.steps(found.plan))
     if found.bound < math.inf or found.plan is not None:

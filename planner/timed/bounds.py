@@ -13,7 +13,7 @@ from math import isfinite
 import numpy as np
 
 from confab.planner.grounded.grounding import ground
-from confab.planner.grounded.shortest import ways
+from confab.planner.grounded.shortest import each_goal_alone
 from confab.planner.grounded.task import Task, bits_of
 from confab.planner.hierarchical.bounds import lm_cut
 from confab.planner.plan import Reason, UngroundableError
@@ -53,7 +53,7 @@ def of_any_plan(problem: Problem) -> Fraction:
         return Fraction(0)
     lasts, actors, every = _durations(problem, task)
     task.costs[:] = [seconds * many for seconds, many in zip(lasts, actors, strict=True)]
-    work = ways(task)(task.initial)
+    work = each_goal_alone(task)(task.initial)
     if len(task) <= MOST_CUT:
         work = max(work, lm_cut(task, current().at)(task.initial))
     least = max(_chain(task, lasts), work / every if every else 0.0)

@@ -13,7 +13,7 @@ from time import perf_counter
 import pytest
 
 from confab.planner.grounded.grounding import ground as grounded
-from confab.planner.grounded.shortest import shortest, ways
+from confab.planner.grounded.shortest import each_goal_alone, shortest
 from confab.planner.grounded.task import Task
 from confab.planner.hierarchical import bounds as optimal
 from confab.planner.hierarchical.planner import compiled, plan
@@ -47,7 +47,7 @@ def steps_of(problem: Problem, level: int, most: int = 10**6) -> float | None:
     task = grounded(problem, level)
     if not isinstance(task, Task):
         return math.inf
-    found = shortest(task, most=most)
+    found = shortest(task, most_expanded=most)
     return found.bound if found.plan is not None or found.bound == math.inf else None
 
 
@@ -273,8 +273,8 @@ def test_a_search_with_an_upper_bound_finds_the_same_shortest_plans() -> None:
         if isinstance(task, Task):
             truth = shortest(task).bound
             below = min(truth, 30) + 1
-            assert min(shortest(task, ways(task), below).bound, below) == min(truth, below), seed
-            assert shortest(task, ways(task), truth).plan is None, seed
+            assert min(shortest(task, each_goal_alone(task), below).bound, below) == min(truth, below), seed
+            assert shortest(task, each_goal_alone(task), truth).plan is None, seed
             compared += truth < math.inf
     assert compared > 10
 

@@ -19,10 +19,10 @@ from confab.planner.grounded.greedy import Greedy
 from confab.planner.grounded.grounding import ground
 from confab.planner.grounded.hff import Evaluate, Evaluation, heuristic
 from confab.planner.grounded.landmarks import landmarks
-from confab.planner.grounded.lookahead import ahead
+from confab.planner.grounded.lookahead import lookahead
 from confab.planner.grounded.novelty import Novelty
-from confab.planner.grounded.plan_windows import regrouped, shortened, shorter
-from confab.planner.grounded.shortest import Cheapest, nothing
+from confab.planner.grounded.plan_windows import regrouped, shorter, without_superfluous_steps
+from confab.planner.grounded.shortest import AStar, nothing
 from confab.planner.grounded.successors import tree
 from confab.planner.grounded.task import Task
 from confab.planner.hierarchical import planner as fast
@@ -154,13 +154,13 @@ def test_steps_that_the_goal_does_not_need_are_dropped() -> None:
     plan = list(search(task).plan)
     light = next(o for o in plan if task.describe(o)[0] == "LIGHT")
     doubled = [light, *plan] if task.applied(task.initial, light) is not None else [*plan, light]
-    assert len(shortened(task, doubled)) <= len(plan)
+    assert len(without_superfluous_steps(task, doubled)) <= len(plan)
 
 
 ORDERS: dict[str, Callable[[Task], SearchOrder]] = {
     "novelty": lambda task: Novelty(task, heuristic(task), 1, landmarks(task), Counts()),
-    "h_FF": lambda task: Greedy(task, heuristic(task), ahead(task), 1, Counts()),
-    "cost": lambda task: Cheapest(task, nothing, math.inf, Counts()),
+    "h_FF": lambda task: Greedy(task, heuristic(task), lookahead(task), 1, Counts()),
+    "cost": lambda task: AStar(task, nothing, math.inf, Counts()),
 }
 
 
@@ -235,13 +235,15 @@ def test_windows_shorten_a_plan_that_still_achieves_the_goal() -> None:
     ]
     plan = shorter(task, first, work=10**7)
     assert plan == shorter(task, first, work=10**7)
-    assert len(plan) == 17 < len(shortened(task, first))  # three trips with two parcels, and two trips back
+    assert (
+        len(plan) == 17 < len(without_superfluous_steps(task, first))
+    )  # three trips with two parcels, and two trips back
     state: int | None = task.initial
     for operator in plan:
         assert state is not None
         state = task.applied(state, operator)
     assert state is not None and state & task.goal == task.goal
-    assert shorter(task, first, work=0) == shortened(task, first)
+    assert shorter(task, first, work=0) == without_superfluous_steps(task, first)
 
 
 def test_remaining_work_is_spent_on_the_whole_plan_until_no_plan_is_cheaper() -> None:
@@ -308,7 +310,7 @@ def test_a_lookahead_drives_back_for_the_remaining_goals() -> None:
     assert isinstance(task, Task)
     evaluation = heuristic(task)(task.initial)
     assert evaluation is not None
-    state, path = ahead(task)(task.initial, evaluation.plan)
+    state, path = lookahead(task)(task.initial, evaluation.plan)
     assert state & task.goal == task.goal
     assert task.carried_out(task.initial, path) == (state, path)
     assert len(path) <= 4 * 12 + 1  # one parcel at a time, there and back
@@ -336,7 +338,7 @@ def test_a_lookahead_replaces_a_step_that_is_not_applicable() -> None:
     assert isinstance(task, Task)
     evaluation = heuristic(task)(task.initial)
     assert evaluation is not None and evaluation[0] == 6
-    state, path = ahead(task)(
+    state, path = lookahead(task)(
         task.initial, evaluation[1]
     )  # from a to b, c and d: only one of these moves is applicable in the given form
     assert state & task.goal == task.goal and len(path) == 6
@@ -401,7 +403,7 @@ def test_similar_conditional_effects_are_joined_once_and_keep_their_meaning(monk
     assert len(problem.domain.behaviors["TURN"].effects) == 3 * 5**3
     task = ground(problem)
     joins = len(reachability.Reached(problem, 1, problem.initial, 10**6, None).schemas)
-    monkeypatch.setattr(reachability, "lifted", lambda problem, level: problem)
+    monkeypatch.setattr(reachability, "merged", lambda problem, level: problem)
     singly = ground(problem)
     assert isinstance(task, Task) and isinstance(singly, Task)
     assert joins <= 10 < len(reachability.Reached(problem, 1, problem.initial, 10**6, None).schemas)

@@ -30,12 +30,12 @@ def test_lm_cut_never_overestimates_and_a_star_with_it_is_optimal(part: int) -> 
         task = ground(problem, 3)
         if isinstance(task, Reason):
             continue
-        truth = shortest(task, most=3_000)
+        truth = shortest(task, most_expanded=3_000)
         if truth.plan is None and truth.bound < math.inf:
             continue  # too many states
         heuristic = lm_cut(task)
         assert heuristic(task.initial) <= truth.bound, seed
-        found = shortest(task, heuristic, most=1000)
+        found = shortest(task, heuristic, most_expanded=1000)
         assert found.bound <= truth.bound, seed
         if found.plan is not None:
             compared += 1
