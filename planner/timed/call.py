@@ -165,7 +165,7 @@ def in_time(
         return Timed(reason=Reason(str(error)))
     network = network_of(order, separation)
     choices = choices_of(problem, plan, order, network) if events is None else ActorChoices()
-    proved: int | None = None
+    proved: int | None = None  # the first choices allow the most schedules
     while True:
         bound = least(order, network, choices)
         found = shortest(order, network, choices, until, bound)
@@ -177,7 +177,7 @@ def in_time(
 
             solved, bound = shorter(order, network, choices, found, bound, until - perf_counter())
             scheduler, every = "CP-SAT", [solved] if solved is found or found.begins.late else [solved, found]
-        proved = bound if proved is None else min(bound, proved)  # the first choices allow the most schedules
+        proved = bound if proved is None else proved
         for found in every:
             if found.begins.late:
                 return Timed(
