@@ -15,7 +15,6 @@ from math import lcm
 
 from confab.planner.timed.order import BEGIN, END, Edge, Order
 
-Arc = tuple[int, int, int]
 Window = tuple[int, int | None]
 ALWAYS: tuple[Window, ...] = ((0, None),)
 """The time windows of an activity that can take place at any time."""

@@ -18,6 +18,8 @@ from confab.planner.timed.listing import Listing
 from confab.planner.timed.network import Begins, Network, earliest
 from confab.planner.timed.order import BEGIN, END, Edge, Order, Resource, Turn, TurnId
 
+Exchange = tuple[TurnId, TurnId | int]
+"""A turn, and the turn with which it changes places or the number of the actor to which it moves."""
 ROUNDS = 100
 """Maximum number of exchanges of turns without a better schedule."""
 MOST_ARCS = 400_000
@@ -169,11 +171,6 @@ class _ScheduleSearch:
     ) -> None:
         self.order, self.network, self.choices, self.fixed, self.work = order, network, choices, fixed, work
         self.slow = slow
-        self.turns_of: list[list[TurnId]] = [[] for _ in order.activities]
-        for resource, one in enumerate(order.resources):
-            for number, turn in enumerate(one.turns):
-                for member in turn.members:
-                    self.turns_of[member].append((resource, number))
 
     def evaluated(self, turns: list[list[TurnId]]) -> CandidateSchedule | None:
         """Return the schedule for an order of turns, or None if the order has no schedule."""
@@ -199,30 +196,30 @@ class _ScheduleSearch:
         left = (
             self.work // (1 + len(self.network.edges) + len(self.network.durations)) // (1 if self.slow is None else 2)
         )
-        tabu: dict[tuple[TurnId, TurnId], int] = {}
+        tabu: dict[Exchange, int] = {}
         step = 0
         while best.cost > (0, 0, bound) and barren < ROUNDS and left > 0 and perf_counter() < until:
             step += 1
             barren += 1
-            options: list[tuple[tuple[int, int, int], int, tuple[TurnId, TurnId], CandidateSchedule]] = []
-            for pair, turns in self.neighbours(now):
+            options: list[tuple[tuple[int, int, int], int, Exchange, CandidateSchedule]] = []
+            for exchange, undoing, turns in self.neighbours(now):
                 left -= 1
                 if left < 0 or perf_counter() > until:
                     break
                 other = self.evaluated(turns)
-                if other is None or (tabu.get(pair, 0) > step and other.cost >= best.cost):
+                if other is None or (tabu.get(exchange, 0) > step and other.cost >= best.cost):
                     continue
-                options.append((other.cost, len(options), pair, other))
+                options.append((other.cost, len(options), undoing, other))
             if not options:
                 break
-            _, _, pair, now = min(options)[:4]
-            tabu[pair[1], pair[0]] = step + TABU
+            _, _, undoing, now = min(options)
+            tabu[undoing] = step + TABU
             if now.cost < best.cost:
                 best, barren = now, 0
         return best
 
-    def neighbours(self, now: CandidateSchedule) -> Iterator[tuple[tuple[TurnId, TurnId], list[list[TurnId]]]]:
-        """Yield the orders of turns after an exchange on the critical path, each with an identifier of the exchange.
+    def neighbours(self, now: CandidateSchedule) -> Iterator[tuple[Exchange, Exchange, list[list[TurnId]]]]:
+        """Yield the exchanges on the critical path, each with the exchange that undoes it and the orders of turns after it.
 
         An exchange swaps two neighbouring turns, or moves a turn to another actor.
         """
@@ -232,14 +229,18 @@ class _ScheduleSearch:
                 if one in self.fixed or other in self.fixed:
                     continue
                 if self.meets(one, critical) and self.meets(other, critical):
-                    yield (one, other), self.replaced(now, {resource: [*line[:i], other, one, *line[i + 2 :]]})
+                    yield (
+                        (one, other),
+                        (other, one),
+                        self.replaced(now, {resource: [*line[:i], other, one, *line[i + 2 :]]}),
+                    )
             for turn in line:
                 able = () if turn in self.fixed else self.choices.of.get(turn, ())
                 if able and self.meets(turn, critical):
                     for target in able:
                         if target != resource:
                             for turns in self.moved(now, turn, resource, target):
-                                yield (turn, (resource, -1 - target)), turns
+                                yield (turn, target), (turn, resource), turns
 
     def moved(self, now: CandidateSchedule, turn: TurnId, resource: int, target: int) -> Iterator[list[list[TurnId]]]:
         """Yield the orders of turns in which a turn is moved to another actor.
