@@ -14,6 +14,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice, product
+from typing import TypeVar
 
 import networkx
 
@@ -21,8 +22,21 @@ from confab.planner.timed.network import Network
 from confab.planner.timed.order import END, Edge, Order, TurnId
 from confab.reasoner.limits import check
 
+Chosen = TypeVar("Chosen")
 MOST_CREWS = 64
 """Maximum number of combinations of actors that are compared for a block."""
+
+
+def combinations(choices: Sequence[Sequence[Chosen]]) -> Iterator[tuple[Chosen, ...]]:
+    """Yield all combinations of one element of each sequence, so that every element is in one of the first combinations.
+
+    >>> list(combinations(["ab", "xyz"]))
+    [('a', 'x'), ('b', 'y'), ('a', 'z'), ('b', 'x'), ('a', 'y'), ('b', 'z')]
+    """
+    longest = max(range(len(choices)), key=lambda k: len(choices[k]), default=0)
+    for shifts in product(*(range(1 if k == longest else len(its)) for k, its in enumerate(choices))):
+        for i in range(len(choices[longest]) if choices else 1):
+            yield tuple(its[(i + shift) % len(its)] for its, shift in zip(choices, shifts, strict=True))
 
 
 @dataclass
@@ -180,7 +194,7 @@ class Listing:
     def crews(self, block: Sequence[int]) -> Iterator[dict[TurnId, int]]:
         """Yield the assignments of resources to those turns of a block that several actors can take."""
         turns = [t for t in dict.fromkeys(t for i in block for t in self.turns_of[i]) if t in self.of]
-        for its in islice(product(*(self.of[turn] for turn in turns)), MOST_CREWS):
+        for its in islice(combinations([self.of[turn] for turn in turns]), MOST_CREWS):
             yield dict(zip(turns, its, strict=True))
 
     def tried(self, block: Sequence[int]) -> _Appended | set[int]:

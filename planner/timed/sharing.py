@@ -1,9 +1,9 @@
 """Sharing of goals among actors: the goals are planned again, in another order and with other actors, for a better schedule.
 
 A crew restricts the actors and the steps towards a goal: it contains a chosen individual for each class of actors, barred actors,
-and barred steps. The empty crew allows all actors and steps. A task is a goal, or a step to be executed early, with a crew. A
-stretch consists of the steps that achieve a task from a state. The default planner finds the steps of a stretch. All goals that
-were achieved before still hold after a stretch.
+and barred steps. The chosen individual takes part in each step with actors of its class. The empty crew allows all actors and
+steps. A task is a goal, or a step to be executed early, with a crew. A stretch consists of the steps that achieve a task from a
+state. The default planner finds the steps of a stretch. All goals that were achieved before still hold after a stretch.
 
 The first sequence of tasks follows the plan, or assigns each goal greedily to the crew that achieves the goal first. Then the
 search makes one change at a time, preferably to a task on the critical path. A change concerns the crew or the position of a task.
@@ -20,7 +20,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from itertools import islice, product
+from itertools import islice
 from math import inf
 from random import Random
 from time import perf_counter
@@ -30,13 +30,14 @@ from confab.planner.hierarchical.agenda import Agenda
 from confab.planner.hierarchical.call import Call, Compiled, compiled
 from confab.planner.plan import Plan, Step, UnsolvableError, renumbered
 from confab.planner.timed.activities import InapplicableError, activities, in_sequence
+from confab.planner.timed.listing import combinations
 from confab.planner.timed.network import earliest, network_of
 from confab.planner.timed.order import order_of
 from confab.planner.timed.pieces import default_actors
 from confab.planner.timed.schedules import turn_edges
 from confab.planner.validation import BehaviorReader, LoggedState, validate
 from confab.reasoner.limits import LimitError, check
-from confab.reasoner.symbols import AnyOf, Behavior, EqualityCondition, Problem, Symbol, ValueCondition
+from confab.reasoner.symbols import AnyOf, Behavior, Condition, EqualityCondition, Problem, Symbol, ValueCondition
 from confab.reasoner.timing import timing_of
 
 MOST_CREWS = 64
@@ -164,7 +165,7 @@ def crews_of(problem: Problem) -> Iterator[Crew]:
     }
     several = {kind: its for kind, its in classes.items() if len(its) > 1 and kind not in general}
     yield Crew()
-    for its in product(*several.values()) if several else ():
+    for its in combinations(list(several.values())) if several else ():
         yield Crew(tuple(zip(several, its, strict=True)))
 
 
@@ -196,8 +197,10 @@ def with_crew(problem: Problem, crew: Crew) -> Problem:
 
     def asked(behavior: Behavior) -> Behavior:
         acting = _actor_terms(problem, behavior, resting) if behavior.level == lowest else tuple(behavior.kinds)
-        own = [EqualityCondition(t, chosen[k]) for t in acting if (k := behavior.kinds[t]) in chosen]
-        own += [EqualityCondition(t, one, negated=True) for t in acting for one in sorted(crew.without)]
+        own: list[Condition] = [EqualityCondition(t, one, negated=True) for t in acting for one in sorted(crew.without)]
+        for kind in sorted({behavior.kinds[t] for t in acting} & chosen.keys()):
+            takes_part = [EqualityCondition(t, chosen[kind]) for t in acting if behavior.kinds[t] == kind]
+            own += takes_part if len(takes_part) == 1 else [AnyOf(tuple((one,) for one in takes_part))]
         barred = tuple(
             tuple(EqualityCondition(p.name, a) for p, a in zip(behavior.parameters, arguments, strict=bool(arguments)))
             for name, arguments in sorted(crew.barred)

@@ -4,21 +4,31 @@ from __future__ import annotations
 
 from dataclasses import replace
 from fractions import Fraction
+from itertools import islice
 from time import perf_counter, sleep
 
 import pytest
 
 from confab.planner.grounded.best_first import Flat
 from confab.planner.plan import Limits, Plan, Status, Step
-from confab.planner.timed import concurrent
+from confab.planner.solve import Request, solve
+from confab.planner.timed import call, concurrent
+from confab.planner.timed.activities import activities, in_sequence
 from confab.planner.timed.call import best_in_time, in_time
+from confab.planner.timed.exchange import choices_of
+from confab.planner.timed.network import network_of
+from confab.planner.timed.order import order_of
 from confab.planner.timed.plan import Slot, TimedPlan
+from confab.planner.timed.schedules import _ScheduleSearch
+from confab.planner.timed.sharing import Crew, crews_of, with_crew
 from confab.planner.timed.validation import validate_timed
+from confab.planner.validation import Fault
 from confab.reasoner.amounts import Amount, Quantity
 from confab.reasoner.symbols import (
     TRUE,
     AmountEffect,
     Behavior,
+    EqualityCondition,
     Problem,
     SituationType,
     Span,
@@ -26,7 +36,7 @@ from confab.reasoner.symbols import (
     Timing,
 )
 from tests.planner.test_overlapping_by_need import task
-from worlds.writing import becomes, behavior, world
+from worlds.writing import becomes, behavior, has, world
 
 JOBS = ("j1", "j2")
 FROM_100 = ((Fraction(100), None),)
@@ -128,3 +138,65 @@ def test_each_search_without_durations_gets_half_of_the_time_that_is_left(monkey
     concurrent.plan(problem, Limits(seconds=2.0))
     assert len(ends) == 2
     assert ends[1] < 1.9
+
+
+def test_a_chosen_robot_hands_over_to_another_robot() -> None:
+    over = lasting(
+        behavior(
+            "HANDOVER",
+            1,
+            "?giver:Robot ?taker:Robot ?j:Job",
+            [has("HOLDER", "?j", "?giver"), EqualityCondition("?giver", "?taker", negated=True)],
+            [becomes("HOLDER", "?j", "?taker")],
+        ),
+        10,
+        "?giver",
+        "?taker",
+    )
+    robots = ("r1", "r2", "r3")
+    holder = SituationType("HOLDER", ("Job",), "Robot")
+    goal = {"HOLDER j1": "r2"}
+    problem = world([holder], [over], {"Robot": robots, "Job": JOBS}, {"HOLDER j1": "r1"}, goal)
+    direct, *rest = (solve(Request(with_crew(problem, Crew((("Robot", robot),))))).plan for robot in robots)
+    assert direct is not None
+    assert len(direct.primitives) == 1
+    assert [plan is not None and len(plan.primitives) for plan in rest] == [1, 2]
+
+
+def test_every_actor_is_chosen_in_one_of_the_first_crews() -> None:
+    kinds = {kind: tuple(f"{kind}{i}" for i in range(n)) for kind, n in (("Robot", 8), ("Cart", 10), ("Arm", 9))}
+    work = lasting(
+        behavior("WORK", 1, "?r:Robot ?c:Cart ?a:Arm", [], [becomes("DONE", "?c", TRUE)]), 10, "?r", "?c", "?a"
+    )
+    problem = world([truth("DONE", "Cart")], [work], kinds, {}, {"DONE Cart0": TRUE})
+    crews = list(islice(crews_of(problem), 11))
+    assert {one for crew in crews for _, one in crew.chosen} == {one for its in kinds.values() for one in its}
+    assert len(set(crews_of(problem))) == 1 + 8 * 9 * 10
+
+
+def test_a_weaker_bound_for_fewer_choices_replaces_no_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = jobs(("r1", "r2"), {})
+    bounds, faults = iter((10, 5)), iter(([Fault((), "refused")], list[Fault]()))
+    monkeypatch.setattr(call, "least", lambda *_: next(bounds))
+    monkeypatch.setattr(call, "validate_timed", lambda *_: next(faults))
+    timed = in_time(problem, steps(problem, *(("WORK", "r1", job) for job in JOBS))).plan
+    assert timed is not None
+    assert timed.bound == 10
+
+
+def test_the_exchange_that_undoes_a_move_moves_the_turn_back() -> None:
+    problem = jobs(("r1", "r2"), {})
+    plan = steps(problem, ("WORK", "r1", "j1"), ("WORK", "r1", "j2"))
+    order = order_of(
+        problem, activities(problem, plan.primitives, in_sequence(plan.primitives)), in_sequence(plan.primitives)
+    )
+    network = network_of(order)
+    network.durations[0] = 30
+    search = _ScheduleSearch(order, network, choices_of(problem, plan, order, network))
+    start = search.evaluated(order.turns)
+    assert start is not None
+    for _, undoing, turns in search.neighbours(start):
+        after = search.evaluated(turns)
+        assert after is not None
+        back = [its for exchange, _, its in search.neighbours(after) if exchange == undoing]
+        assert order.turns in back or undoing[0][1] not in search.critical(after)
