@@ -122,11 +122,11 @@ class _ScheduleModel:
     def resources(self) -> None:
         model, apart = self.model, self.network.separation
         takes: list[list[tuple[Any, int]]] = [[] for _ in self.order.resources]
+        readers = [sum(turn.reading for turn in one.turns) for one in self.order.resources]
         for resource, one in enumerate(self.order.resources):
             if one.pool is not None:
                 self.pool(resource, one)
                 continue
-            readers = sum(turn.reading for turn in one.turns)
             for number, turn in enumerate(one.turns):
                 key = (resource, number)
                 begin = self.begin_of[key] = model.NewIntVar(0, self.horizon, "")
@@ -137,25 +137,24 @@ class _ScheduleModel:
                 for member, which in turn.highs:
                     model.Add(end >= self.begins[member] + (0 if which == BEGIN else self.lasts[member]) + apart)
                 able = self.choices.of.get(key, (resource,))
-                demand = 1 if turn.reading else max(readers, 1)
                 if len(able) == 1:
+                    demand = 1 if turn.reading else readers[resource]
                     takes[resource].append((model.NewIntervalVar(begin, size, end, ""), demand))
                     continue
                 chosen = [model.NewBoolVar("") for _ in able]
                 model.AddExactlyOne(chosen)
                 for target, is_it in zip(able, chosen, strict=True):
                     self.present[key, target] = is_it
-                    takes[target].append((model.NewOptionalIntervalVar(begin, size, end, is_it, ""), demand))
+                    takes[target].append((model.NewOptionalIntervalVar(begin, size, end, is_it, ""), readers[target]))
                     for member in turn.members:
                         if not isinstance(self.lasts[member], int):
                             lasts = self.choices.lasts.get((key, target), {})
                             its = lasts.get(member, self.network.durations[member])
                             model.Add(self.lasts[member] == its).OnlyEnforceIf(is_it)
         for resource, intervals in enumerate(takes):
-            demands = {demand for _, demand in intervals}
-            if len(demands) > 1:
-                model.AddCumulative([i for i, _ in intervals], [d for _, d in intervals], max(demands))
-            elif intervals and not all(turn.reading for turn in self.order.resources[resource].turns):
+            if readers[resource]:
+                model.AddCumulative([i for i, _ in intervals], [d for _, d in intervals], readers[resource])
+            elif intervals:
                 model.AddNoOverlap([i for i, _ in intervals])
 
     def pool(self, resource: int, one: Resource) -> None:
