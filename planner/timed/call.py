@@ -13,11 +13,11 @@ from time import perf_counter
 import networkx
 
 from confab.planner.plan import Plan, Reason, Step, renumbered
-from confab.planner.timed.activities import Activity, InapplicableError, StepEvent, activities, in_sequence
+from confab.planner.timed.activities import InapplicableError, StepEvent, activities, in_sequence
 from confab.planner.timed.bounds import of_any_plan
 from confab.planner.timed.exchange import choices_of, exchanged
 from confab.planner.timed.network import Begins, Network, network_of
-from confab.planner.timed.order import BEGIN, END, Order, TurnId, order_of
+from confab.planner.timed.order import END, Order, TurnId, order_in_sequence, order_of
 from confab.planner.timed.plan import THESE_STEPS, Slot, TimedPlan
 from confab.planner.timed.schedules import (
     ActorChoices,
@@ -28,7 +28,7 @@ from confab.planner.timed.schedules import (
     turn_edges,
 )
 from confab.planner.timed.validation import validate_timed
-from confab.planner.validation import Cell, validate
+from confab.planner.validation import validate
 from confab.reasoner.limits import LimitError, check, overtime, within
 from confab.reasoner.symbols import Fact, Problem, Times
 from confab.reasoner.timing import judged_by_events
@@ -80,10 +80,10 @@ def best_in_time(
         return None if until is None else max(until - perf_counter(), 0.0) * share
 
     def enough(one: Timed) -> bool:
-        timed = one.plan
-        return timed is not None and (
-            not shorten or timed.makespan <= bound or evenly_shared(problem, timed.work, timed.makespan)
-        )
+        if one.plan is None or not shorten:
+            return one.plan is not None
+        makespan = makespan_of(problem, one.plan)
+        return makespan <= bound or evenly_shared(problem, one.plan.work, makespan)
 
     try:
         found = in_time(problem, plan, left(0.25 if shorten else 1.0), separation)
@@ -99,7 +99,7 @@ def best_in_time(
         other = shared(problem, plan, end, shorten, bound)
         if other is not None:
             with suppress(LimitError):
-                found = _better(found, in_time(problem, other, left(0.5 if shorten else 1.0), separation))
+                found = _better(problem, found, in_time(problem, other, left(0.5 if shorten else 1.0), separation))
             found = _spread(problem, other, found, left(1.0), separation) if shorten else found
     if found.plan is None or not shorten:
         return found
@@ -110,7 +110,7 @@ def keeps_times(problem: Problem, plan: Plan) -> bool:
     """Return whether a schedule of the steps of a plan is found that keeps all time windows and deadlines."""
     steps = plan.primitives
     try:
-        order = order_of(problem, activities(problem, steps, in_sequence(steps)), in_sequence(steps))
+        order = order_in_sequence(problem, steps)
     except InapplicableError:
         return False
     network = network_of(order)
@@ -124,15 +124,27 @@ def _spread(problem: Problem, plan: Plan, known: Timed, seconds: float | None, s
 
     with suppress(LimitError):
         several = spread(problem, plan)
-        return known if several is plan else _better(known, in_time(problem, several, seconds, separation))
+        return known if several is plan else _better(problem, known, in_time(problem, several, seconds, separation))
     return known
 
 
-def _better(one: Timed, other: Timed) -> Timed:
-    """Return the second of two results if it misses its times by less or has a smaller makespan, else the first."""
+def _better(problem: Problem, one: Timed, other: Timed) -> Timed:
+    """Return the second of two results if it is better, else the first.
+
+    A plan with a smaller makespan is better. Without plans, it is better to miss times by less, or to miss times instead of having
+    another fault.
+    """
     if one.plan is None:
-        return other if other.plan is not None or 0 < other.late < one.late else one
-    return other if other.plan is not None and other.plan.makespan < one.plan.makespan else one
+        return other if other.plan is not None or (other.late and not 0 < one.late <= other.late) else one
+    return (
+        other if other.plan is not None and makespan_of(problem, other.plan) < makespan_of(problem, one.plan) else one
+    )
+
+
+def makespan_of(problem: Problem, timed: TimedPlan) -> Fraction:
+    """Return the end of the last primitive of a timed plan that isn't an external event; no schedule changes the events' times."""
+    events = (problem.times or Times()).events
+    return max((slot.end for slot in timed.slots if slot.step.behavior not in events), default=Fraction(0))
 
 
 def in_time(
@@ -171,17 +183,19 @@ def in_time(
         found = shortest(order, network, choices, until, bound)
         if found is None:
             return Timed(reason=Reason("these steps have no schedule: they exclude each other's order"))
-        scheduler, every = "exchanges", [found]
+        every = [("exchanges", found)]
         if found.begins.cost > (0, bound) and find_spec("ortools") is not None:
             from confab.planner.timed.cpsat import shorter
 
             solved, bound = shorter(order, network, choices, found, bound, until - perf_counter())
-            scheduler, every = "CP-SAT", [solved] if solved is found or found.begins.late else [solved, found]
+            if solved is not found:
+                every = [("CP-SAT", solved), *(() if found.begins.late else every)]
         proved = bound if proved is None else proved
-        for found in every:
+        for scheduler, found in every:
             if found.begins.late:
                 return Timed(
-                    reason=_late(problem, order, network, choices, found), late=found.begins.late * network.unit
+                    reason=_late(problem, plan, order, network, choices, found),
+                    late=found.begins.late * network.unit,
                 )
             timed = timed_plan(problem, plan, order, network, choices, found)
             if timed is not None:
@@ -200,36 +214,33 @@ def in_time(
         choices = replace(choices, of={turn: able for turn, able in choices.of.items() if moved and turn not in moved})
 
 
-def _late(problem: Problem, order: Order, network: Network, choices: ActorChoices, found: CandidateSchedule) -> Reason:
+def _late(
+    problem: Problem, plan: Plan, order: Order, network: Network, choices: ActorChoices, found: CandidateSchedule
+) -> Reason:
     """Return the reason why a schedule is late.
 
     The reason names what the activity with the greatest lateness misses: time windows of individuals, deadlines, or a fixed time.
     """
     i, times = found.begins.latest, problem.times or Times()
-    one = order.activities[i]
+    one, renamed = order.activities[i], renamed_by(order, found.turns)
+    step = exchanged(problem, plan, renamed).primitives[i]
     begin = found.begins.begins[i] * network.unit
     lasts = durations_with(network, choices, found.turns)[i] * network.unit
     end, missed = begin + lasts, []
-    for individual in dict.fromkeys((*one.step.arguments, *one.actors)):
+    for individual in dict.fromkeys((*step.arguments, *(renamed.get(i, {}).get(a, a) for a in one.actors))):
         windows = times.windows.get(individual)
         if windows is not None and not any(low <= begin and (high is None or end <= high) for low, high in windows):
             missed.append(f"{individual} is available only {' and '.join(map(_written, windows))}")
-    for symbol, by in times.deadlines.items():
-        late = any((end if which == END else begin) > order.latest.get((i, which), end) for which in (BEGIN, END))
-        if late and symbol in problem.goal and (symbol.situation, symbol.arguments) in changed_by(one):
+    for symbol, (changing, which, by) in order.latest.items():
+        if changing == i and (end if which == END else begin) > by:
             missed.append(f"{Fact(symbol, problem.goal[symbol])} is a goal by {float(by):g} s")
     if one.at is not None and begin > one.at:
         missed.append(f"it happens at {float(one.at):g} s")
     return Reason(
-        f"no schedule was found that keeps all windows and deadlines; in the best one found, {one.step} "
+        f"no schedule was found that keeps all windows and deadlines; in the best one found, {step} "
         f"takes from {float(begin):g} to {float(end):g} s, but {', and '.join(missed)}",
-        (str(one.step),),
+        (str(step),),
     )
-
-
-def changed_by(activity: Activity) -> set[Cell]:
-    """Return the symbols that an activity changes."""
-    return {cell for access in activity.accesses for cell in access.changes}
 
 
 def _written(window: tuple[Fraction, Fraction | None]) -> str:

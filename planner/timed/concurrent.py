@@ -88,7 +88,7 @@ def plan(problem: Problem, limits: Limits, separation: Fraction = Fraction(0)) -
         )
     deadline = limits.end()
     some, every = only_during(problem), frozenset(name for name, b in problem.domain.behaviors.items() if b.timing)
-    counts = Counts()
+    counts, limited, refused = Counts(), False, None
     try:
         for names, guarded in ((some, True), (some, False), (every, False)):
             cut = _Cut(problem, names, guarded)
@@ -100,6 +100,7 @@ def plan(problem: Problem, limits: Limits, separation: Fraction = Fraction(0)) -
                 steps, events = cut.steps(task, found)
                 left = None if deadline is None else max(deadline - perf_counter(), 0.0)
                 timed = in_time(problem, steps, left, separation, events)
+                refused = timed.reason or refused
                 if timed.plan is not None:
                     seconds = perf_counter() - began
                     its = TimedOutcome(
@@ -110,11 +111,18 @@ def plan(problem: Problem, limits: Limits, separation: Fraction = Fraction(0)) -
                         timed=timed.plan,
                     )
                     return its, timed
+            limited = limited or finder.limited
     except (UngroundableError, OutOfTimeError) as error:
         return ended(str(error))
     except MemoryError:
         return ended(OUT_OF_MEMORY.text)
-    return ended("no plan was found whose concurrent steps have a schedule")
+    if refused is not None:
+        return ended(f"no plan was found whose concurrent steps have a schedule; of the last one tried, {refused.text}")
+    return ended(
+        f"no plan with concurrent steps was found in {MOST_STATES} states"
+        if limited
+        else "no plan with concurrent steps was found"
+    )
 
 
 @dataclass(frozen=True)
@@ -279,6 +287,8 @@ class _Finder:
     separation: Fraction
     deadline: float | None
     counts: Counts = field(default_factory=Counts)
+    limited: bool = False
+    """Whether the search with durations has ended at `MOST_STATES`."""
     accesses: dict[int, tuple[int, int]] = field(default_factory=dict)
     """The stored results of `access`, by operator."""
     places: dict[tuple[str, tuple[str, ...]], int] = field(default_factory=dict)
@@ -361,9 +371,12 @@ class _Finder:
         came_from[key] = None
         number = 0
         queue: list[tuple[int, int, int, _SearchNode, list[int]]] = [(began.h, 0, 0, root, self.ranked(began))]
-        while queue and len(came_from) < MOST_STATES:
+        while queue:
             check("searching for concurrent steps", 0.0)
             if self.deadline is not None and perf_counter() > self.deadline:
+                raise OutOfTimeError("the time limit was reached while searching for concurrent steps")
+            if len(came_from) >= MOST_STATES:
+                self.limited = True
                 return
             h, tries, _, node, operators = heapq.heappop(queue)
             for position, operator in enumerate(operators):

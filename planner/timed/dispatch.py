@@ -22,7 +22,7 @@ from math import ceil, floor, inf
 
 from confab.planner.plan import Step
 from confab.planner.timed.activities import EventKind, StepEvent, activities
-from confab.planner.timed.call import changed_by, renamed_by, timed_plan
+from confab.planner.timed.call import renamed_by, timed_plan
 from confab.planner.timed.exchange import choices_of, exchanged
 from confab.planner.timed.network import Begins, Network, earliest, network_of
 from confab.planner.timed.order import BEGIN, END, Edge, TurnId, order_of
@@ -133,17 +133,13 @@ class Dispatch:
         """Return the goals that are expected after their deadlines."""
         if not self.order.latest:
             return []
-        time, deadlines = self._units(now), (self.problem.times or Times()).deadlines
+        time = self._units(now)
         slow, fast = self._expected(time), self._expected(time, -self.spread)
         found = []
-        for (i, which), by in self.order.latest.items():
+        for goal, (i, which, by) in self.order.latest.items():
             at = [one.begins[i] + (lasts[i] if which == END else 0) for lasts, one in (slow, fast)]
             if at[0] * self.network.unit > by:
-                found += [
-                    Late(goal, at[0] * self.network.unit, by, at[1] * self.network.unit > by)
-                    for goal, its in deadlines.items()
-                    if its == by and (goal.situation, goal.arguments) in changed_by(self.order.activities[i])
-                ]
+                found.append(Late(goal, at[0] * self.network.unit, by, at[1] * self.network.unit > by))
         return found
 
     def misses(self, now: Fraction, before: Fraction) -> Fraction | None:
@@ -156,7 +152,7 @@ class Dispatch:
         low, high = self._units(now), self._units(before)
         lasts, begins = self._expected(high, -self.spread)
         found = []
-        for (i, which), by in self.order.latest.items():
+        for i, which, by in self.order.latest.values():
             late_by = begins.begins[i] + (lasts[i] if which == END else 0) - floor(by / self.network.unit)
             if late_by > 0 and low < (at := high - late_by + 1) < high:
                 found.append(at)

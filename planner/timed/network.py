@@ -7,7 +7,7 @@ constraint networks", Artificial Intelligence 49 (1991).
 
 from __future__ import annotations
 
-from collections import deque
+from collections import defaultdict, deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -96,6 +96,7 @@ class Begins:
     waits_for : list of int
         The activity that determines the begin of each activity; -1 if no activity determines the begin.
     makespan : int
+        The end of the last activity without a fixed begin.
     late : int
         The sum of the times by which activities miss their latest times, time windows or fixed times. If the sum is 0, the begins
         satisfy the network.
@@ -119,13 +120,22 @@ def network_of(order: Order, separation: Fraction = Fraction(0), more: Iterable[
     """Return the network of an order; the unit of the network also divides the times in `more`."""
     fixed = [one.at for one in order.activities]
     ends = [end for windows in order.windows.values() for window in windows for end in window if end is not None]
-    times = [separation, *(one.duration for one in order.activities), *ends, *order.latest.values(), *more]
+    times = [
+        separation,
+        *(one.duration for one in order.activities),
+        *ends,
+        *(by for *_, by in order.latest.values()),
+        *more,
+    ]
     unit = Fraction(1, lcm(*(time.denominator for time in (*times, *(t for t in fixed if t is not None)))))
 
     def whole(time: Fraction) -> int:
         return int(time / unit)
 
     count = range(len(order.activities))
+    latest: dict[int, list[tuple[int, int]]] = defaultdict(list)
+    for i, which, by in order.latest.values():
+        latest[i].append((which, whole(by)))
     return Network(
         unit,
         whole(separation),
@@ -133,7 +143,7 @@ def network_of(order: Order, separation: Fraction = Fraction(0), more: Iterable[
         [whole(one.duration) for one in order.activities],
         order.edges,
         [None if time is None else whole(time) for time in fixed],
-        [tuple((w, whole(order.latest[i, w])) for w in (BEGIN, END) if (i, w) in order.latest) for i in count],
+        [tuple(latest[i]) for i in count],
         [
             tuple((whole(low), None if high is None else whole(high)) for low, high in order.windows[i])
             if i in order.windows

@@ -19,7 +19,9 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import pairwise
 
-from confab.planner.timed.activities import Activity, EventKind, InapplicableError, ReadAccess, StepEvent
+from confab.planner.plan import Step
+from confab.planner.timed.activities import Activity, EventKind, InapplicableError, ReadAccess, StepEvent, in_sequence
+from confab.planner.timed.activities import activities as simulated
 from confab.planner.timed.pools import AmountPool, AmountUse, pool_of
 from confab.planner.validation import Cell
 from confab.reasoner.limits import check
@@ -68,8 +70,8 @@ class Order:
     activities : tuple of Activity
     edges : tuple of Edge
     resources : tuple of Resource
-    latest : mapping of (activity, begin or end) to seconds
-        The latest time of an event that achieves a goal with a deadline.
+    latest : mapping of goal to (activity, begin or end, seconds)
+        The event that achieves a goal with a deadline, and the deadline.
     windows : mapping of activity to pairs of seconds
         The time windows of an activity; begin and end must lie within the same time window.
     """
@@ -77,7 +79,7 @@ class Order:
     activities: tuple[Activity, ...]
     edges: tuple[Edge, ...]
     resources: tuple[Resource, ...]
-    latest: Mapping[tuple[int, int], Fraction] = field(default_factory=dict)
+    latest: Mapping[Symbol, tuple[int, int, Fraction]] = field(default_factory=dict)
     windows: Mapping[int, tuple[tuple[Fraction, Fraction | None], ...]] = field(default_factory=dict)
 
     @property
@@ -155,6 +157,17 @@ def order_of(problem: Problem, activities: Sequence[Activity], events: Iterable[
         _latest(problem, times, records),
         _windows(times, activities),
     )
+
+
+def order_in_sequence(problem: Problem, steps: Sequence[Step]) -> Order:
+    """Return the necessary order of steps that are executed one after another.
+
+    Raises
+    ------
+    InapplicableError
+        A step isn't applicable at its position.
+    """
+    return order_of(problem, simulated(problem, steps, in_sequence(steps)), in_sequence(steps))
 
 
 def _pools(problem: Problem, activities: Sequence[Activity], events: Sequence[StepEvent]) -> dict[Cell, Resource]:
@@ -347,14 +360,14 @@ def _touching(
 
 def _latest(
     problem: Problem, times: Times, records: Mapping[Cell, Sequence[_TimedAccess]]
-) -> dict[tuple[int, int], Fraction]:
-    """Return the latest times of events; each event is the last change of a goal with a deadline."""
-    found: dict[tuple[int, int], Fraction] = {}
+) -> dict[Symbol, tuple[int, int, Fraction]]:
+    """Return the last change of each goal with a deadline, and the deadline."""
+    found = {}
     for symbol, seconds in times.deadlines.items():
         its = records.get((symbol.situation, symbol.arguments), ())
         changing = [(r.activity, r.high) for r in its if r.written is not None and r.written[0] != r.written[1]]
         if symbol in problem.goal and changing:
-            found[changing[-1]] = min(seconds, found.get(changing[-1], seconds))
+            found[symbol] = (*changing[-1], seconds)
     return found
 
 

@@ -350,5 +350,6 @@ def _work(order: Order, lasts: Sequence[int], turn: TurnId) -> int:
         return 0
     if resource.actor is not None:
         return sum(lasts[m] for m in its.members if resource.actor in order.activities[m].actors)
-    whole = [m for m in its.members if (m, BEGIN) in its.lows and (m, END) in its.highs]
+    free = [m for m in its.members if order.activities[m].at is None]
+    whole = [m for m in free if (m, BEGIN) in its.lows and (m, END) in its.highs]
     return 0 if its.reading else max((lasts[m] for m in whole), default=0)

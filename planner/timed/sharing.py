@@ -29,10 +29,10 @@ from typing import TypeAlias
 from confab.planner.hierarchical.agenda import Agenda
 from confab.planner.hierarchical.call import Call, Compiled, compiled
 from confab.planner.plan import Plan, Step, UnsolvableError, renumbered
-from confab.planner.timed.activities import InapplicableError, activities, in_sequence
+from confab.planner.timed.activities import InapplicableError
 from confab.planner.timed.listing import combinations
 from confab.planner.timed.network import earliest, network_of
-from confab.planner.timed.order import order_of
+from confab.planner.timed.order import order_in_sequence
 from confab.planner.timed.pieces import default_actors
 from confab.planner.timed.schedules import turn_edges
 from confab.planner.validation import BehaviorReader, LoggedState, validate
@@ -525,7 +525,7 @@ class _SharingSearch:
         steps = plan.primitives
         self.spend(SCHEDULING * len(steps))
         try:
-            order = order_of(self.problem, activities(self.problem, steps, in_sequence(steps)), in_sequence(steps))
+            order = order_in_sequence(self.problem, steps)
         except InapplicableError:
             return None
         network = network_of(order)

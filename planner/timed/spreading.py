@@ -12,9 +12,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from confab.planner.plan import Plan, Step
-from confab.planner.timed.activities import InapplicableError, activities, in_sequence
+from confab.planner.timed.activities import InapplicableError
 from confab.planner.timed.exchange import exchanged, possible
-from confab.planner.timed.order import Order, order_of
+from confab.planner.timed.order import Order, order_in_sequence
 from confab.planner.validation import BehaviorReader, LoggedState, validate
 from confab.reasoner.limits import check
 from confab.reasoner.symbols import Problem
@@ -40,7 +40,7 @@ def spread(problem: Problem, plan: Plan) -> Plan:
     """
     steps = plan.primitives
     try:
-        order = order_of(problem, activities(problem, steps, in_sequence(steps)), in_sequence(steps))
+        order = order_in_sequence(problem, steps)
     except InapplicableError:
         return plan
     naming = _naming(steps)

@@ -10,16 +10,16 @@ from time import perf_counter, sleep
 import pytest
 
 from confab.planner.grounded.best_first import Flat
-from confab.planner.plan import Limits, Plan, Status, Step
+from confab.planner.plan import Limits, Plan, Reason, Status, Step
 from confab.planner.solve import Request, solve
 from confab.planner.timed import call, concurrent
-from confab.planner.timed.activities import activities, in_sequence
-from confab.planner.timed.call import best_in_time, in_time
+from confab.planner.timed.activities import Access, Activity
+from confab.planner.timed.call import Timed, best_in_time, in_time
 from confab.planner.timed.exchange import choices_of
-from confab.planner.timed.network import network_of
-from confab.planner.timed.order import order_of
+from confab.planner.timed.network import earliest, network_of
+from confab.planner.timed.order import BEGIN, END, Order, Resource, Turn, TurnId, order_in_sequence
 from confab.planner.timed.plan import Slot, TimedPlan
-from confab.planner.timed.schedules import _ScheduleSearch
+from confab.planner.timed.schedules import ActorChoices, CandidateSchedule, _ScheduleSearch, turn_edges
 from confab.planner.timed.sharing import Crew, crews_of, with_crew
 from confab.planner.timed.validation import validate_timed
 from confab.planner.validation import Fault
@@ -32,6 +32,7 @@ from confab.reasoner.symbols import (
     Problem,
     SituationType,
     Span,
+    Symbol,
     Times,
     Timing,
 )
@@ -187,9 +188,7 @@ def test_a_weaker_bound_for_fewer_choices_replaces_no_bound(monkeypatch: pytest.
 def test_the_exchange_that_undoes_a_move_moves_the_turn_back() -> None:
     problem = jobs(("r1", "r2"), {})
     plan = steps(problem, ("WORK", "r1", "j1"), ("WORK", "r1", "j2"))
-    order = order_of(
-        problem, activities(problem, plan.primitives, in_sequence(plan.primitives)), in_sequence(plan.primitives)
-    )
+    order = order_in_sequence(problem, plan.primitives)
     network = network_of(order)
     network.durations[0] = 30
     search = _ScheduleSearch(order, network, choices_of(problem, plan, order, network))
@@ -200,3 +199,104 @@ def test_the_exchange_that_undoes_a_move_moves_the_turn_back() -> None:
         assert after is not None
         back = [its for exchange, _, its in search.neighbours(after) if exchange == undoing]
         assert order.turns in back or undoing[0][1] not in search.critical(after)
+
+
+def test_a_schedule_is_shortened_although_an_external_event_ends_later() -> None:
+    problem = jobs(("r1", "r2"), {"r2": ((Fraction(0), None),)})
+    strike = behavior("STRIKE", 1, "", [], [becomes("DONE", "j3", TRUE)])
+    behaviors = {**problem.domain.behaviors, "STRIKE": lasting(strike, 0)}
+    problem = replace(
+        problem,
+        domain=replace(problem.domain, behaviors=behaviors, first_ids={}),
+        classes={**problem.classes, "Job": (*JOBS, "j3")},
+        goal={**problem.goal, Symbol("DONE", ("j3",)): TRUE},
+        times=replace(problem.times or Times(), events={"STRIKE": Fraction(100)}),
+    )
+    plan = steps(problem, *(("WORK", "r1", job) for job in JOBS), ("STRIKE",))
+    timed = best_in_time(problem, plan).plan
+    assert timed is not None
+    assert {slot.end for slot in timed.slots} == {10, 100}
+
+
+def test_the_reason_names_the_missed_deadline_and_the_actor_of_the_schedule() -> None:
+    problem = jobs(("r1", "r2"), {})
+    work = problem.domain.behaviors["WORK"]
+    both = lasting(replace(work, effects=(*work.effects, becomes("SEEN", "?j", TRUE)), timing=None), 10, "?r")
+    situations = {**problem.domain.situations, "SEEN": truth("SEEN", "Job")}
+    seen, deadlines = {Symbol("SEEN", (job,)): TRUE for job in JOBS}, {"j1": Fraction(8), "j2": Fraction(5)}
+    problem = replace(
+        problem,
+        domain=replace(problem.domain, behaviors={"WORK": both}, situations=situations, first_ids={}),
+        goal={**problem.goal, **seen},
+        times=Times(
+            {**{Symbol("DONE", (j,)): by for j, by in deadlines.items()}, **dict.fromkeys(seen, Fraction(100))}
+        ),
+    )
+    reason = in_time(problem, steps(problem, *(("WORK", "r1", job) for job in JOBS))).reason
+    assert reason is not None
+    assert "WORK r2 j2 takes from 0 to 10 s, but j2 DONE true is a goal by 5 s" in reason.text
+    assert "SEEN" not in reason.text
+
+
+def test_missed_times_are_a_better_reason_than_a_fault_of_another_kind() -> None:
+    other, late, later = Timed(reason=Reason("no order")), Timed(late=Fraction(5)), Timed(late=Fraction(6))
+    assert [
+        call._better(jobs((), {}), *pair) for pair in ((other, late), (late, other), (later, late), (late, later))
+    ] == [late] * 4
+
+
+@pytest.mark.parametrize(
+    ("most", "said"),
+    [(1000, "no plan with concurrent steps was found"), (1, "no plan with concurrent steps was found in 1 states")],
+)
+def test_the_reason_says_whether_the_search_for_concurrent_steps_was_limited(
+    monkeypatch: pytest.MonkeyPatch, most: int, said: str
+) -> None:
+    monkeypatch.setattr(concurrent, "MOST_STATES", most)
+    outcome, _ = concurrent.plan(
+        task("q", "p", w=(4, "s q, e r", "s !q, e p"), v=(5, "s !q", "e r")), Limits(seconds=60.0)
+    )
+    assert outcome.reason is not None
+    assert outcome.reason.text == said
+
+
+def test_the_reason_says_why_the_schedule_of_concurrent_steps_was_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(concurrent, "in_time", lambda *_: Timed(reason=Reason("it is too late")))
+    outcome, _ = concurrent.plan(
+        task("q", "p", w=(4, "s q, e r", "s !q, e p"), v=(2, "s !q", "e r")), Limits(seconds=60.0)
+    )
+    assert outcome.reason is not None
+    assert outcome.reason.text.endswith("; of the last one tried, it is too late")
+
+
+def test_the_solver_is_named_only_if_its_schedule_is_returned() -> None:
+    pytest.importorskip("ortools")
+    problem = jobs(("r1", "r2"), {})
+    problem = replace(problem, classes={**problem.classes, "Job": (*JOBS, "j3")})
+    timed = in_time(problem, steps(problem, *(("WORK", "r1", job) for job in (*JOBS, "j3")))).plan
+    assert timed is not None
+    assert (timed.makespan, timed.scheduler) == (Fraction(20), "exchanges")
+
+
+def test_the_solver_lets_no_turn_move_to_an_actor_while_other_turns_read_its_symbols() -> None:
+    pytest.importorskip("ortools")
+    from confab.planner.timed.cpsat import shorter
+
+    none = Access()
+    names = [[0, 1, 2], [3, 4]]
+    made = [
+        Activity(Step((i,), i, 1, "DO", ()), Fraction(s), (), none, none, none)
+        for i, s in enumerate((30, 15, 15, 10, 10))
+    ]
+    resources = tuple(
+        Resource(tuple(Turn((i,), ((i, BEGIN),), ((i, END),), i > 2) for i in its), f"r{k}")
+        for k, its in enumerate(names)
+    )
+    order = Order(tuple(made), (), resources)
+    moves: dict[TurnId, tuple[int, ...]] = {(0, 1): (0, 1), (0, 2): (0, 1)}
+    choices = ActorChoices(moves, {(turn, 1): {} for turn in moves})
+    network = network_of(order)
+    begins = earliest(network, turn_edges(order, order.turns))
+    assert begins is not None
+    found, bound = shorter(order, network, choices, CandidateSchedule(order.turns, begins), 0, 60.0)
+    assert (begins.makespan, found.makespan, bound) == (60, 40, 40)
