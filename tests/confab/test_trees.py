@@ -6,6 +6,7 @@ import re
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 from fractions import Fraction
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -97,6 +98,7 @@ def run(problem: Problem, plan: Plan, world: SymbolicWorld, most: int = 300) -> 
     return False, ticking
 
 
+@cache
 def planned(name: str) -> tuple[Problem, Plan]:
     scene = confab.load(name)
     plan = scene.plan().plan

@@ -23,6 +23,7 @@ from confab.planner.plan import Limits, Outcome, Reason, Status
 from confab.planner.possibilities import Lowest
 from confab.planner.solve import MODES, Mode, Request, solve
 from confab.reasoner.amounts import Quantity
+from confab.reasoner.generate import write_scene
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -101,10 +102,14 @@ def test_the_reason_is_the_cause_that_no_behaviour_changes(mode: Mode) -> None:
 
 
 @pytest.mark.parametrize("mode", ["guarded", "paper"])
-def test_goals_about_one_object_that_exclude_each_other_given_rest_values_are_unsolvable(mode: Mode) -> None:
-    outcome = confab.load("beverage-serving").plan("left_hand HOLDS cup1", mode=mode, time_limit=20.0).outcome
+def test_goals_about_one_object_that_exclude_each_other_given_rest_values_are_unsolvable(
+    mode: Mode, tmp_path: Path
+) -> None:
+    """The work of both modes is limited, and not their time, so that the answer is the same on a busy machine."""
+    write_scene(tmp_path / "scene.ttl", "served", 2, 1, 0, 0)
+    outcome = confab.load(tmp_path / "scene.ttl").plan("hand1 HOLDS cup1", mode=mode).outcome
     assert outcome.status is Status.UNSOLVABLE and outcome.certificate is not None
-    goals = {"left_hand HOLDS cup1", "cup1 LOCATION location7", "left_hand HAND_POSITION raised"}
+    goals = {"hand1 HOLDS cup1", "cup1 LOCATION location3", "hand1 HAND_POSITION raised"}
     assert {str(fact) for fact in outcome.certificate.unmet} == goals
 
 
