@@ -162,7 +162,7 @@ def test_no_mode_refuses_a_division_by_an_amount_that_changes(seed: int, tmp_pat
 
 
 @pytest.mark.usefixtures("unlimited_judge")
-@pytest.mark.parametrize("seed", [200_002_806, 200_004_245])
+@pytest.mark.parametrize("seed", [200_002_806])
 def test_a_world_with_few_states_is_certified_by_its_states(seed: int, tmp_path: Path) -> None:
     its = Judge(mixed(seed, 0.0), tmp_path, every=True).judged()
     assert not its.complaints

@@ -293,11 +293,11 @@ def after_interventions(problem: Problem, draw: random.Random) -> Problem:
 @pytest.mark.parametrize(
     ("name", "n", "many", "kept", "cost", "changed", "asked"),
     [
-        ("served", 4, 40, 33, 690, 306, 29),
+        ("served", 4, 16, 15, 272, 112, 12),
         ("swap", 6, 12, 11, 305, 34, 3),
-        ("full", 4, 40, 36, 355, 148, 18),
+        ("full", 4, 16, 14, 146, 50, 10),
         ("handover", 5, 12, 10, 245, 54, 6),
-        ("blocked", 5, 24, 22, 508, 86, 13),
+        ("blocked", 5, 12, 12, 209, 34, 7),
     ],
 )
 def test_repairs_after_random_interruptions_change_few_steps(
