@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from rich.console import Console
 
 from confab import load
-from confab.cli import app
+from confab.cli import app, main
 from confab.commands.given import blame_reach
 from confab.planner.plan import Outcome, Status
 from confab.reasoner.limits import Deadline
@@ -129,15 +129,24 @@ def test_a_demonstration_in_the_order_of_the_figure_is_learned_from_the_command_
     ],
 )
 def test_bad_input_gives_one_clear_line_and_writes_no_file(
-    tmp_path: Path, arguments: list[str], code: int, word: str
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    code: int,
+    word: str,
 ) -> None:
     (tmp_path / "broken.ttl").write_text("@prefix : <x")
-    done = confab(*arguments, cwd=tmp_path)
-    said = done.stderr if code == 2 else done.stdout
-    assert done.returncode == code, done.stderr
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+    with pytest.raises(SystemExit) as end:
+        main(arguments)
+    done = capsys.readouterr()
+    said = done.err if code == 2 else done.out
+    assert end.value.code == code, done.err
     assert word in said
     assert said.count("\n") == 1
-    assert "Traceback" not in done.stderr
+    assert "Traceback" not in done.err
     assert [path.name for path in tmp_path.iterdir()] == ["broken.ttl"]
 
 

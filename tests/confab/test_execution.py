@@ -12,6 +12,7 @@ from rich.console import Console
 
 import confab
 from confab import ontology
+from confab.cli import main
 from confab.execution import execute
 from confab.interchange import episode_json
 from confab.intervening import parse_interventions
@@ -118,11 +119,13 @@ def test_an_execution_whose_goal_becomes_impossible_exits_with_1_and_the_reason(
         (["--save", "beverage-serving"], "wanted a name that ends in .ttl or .json"),
     ],
 )
-def test_misuse_is_one_clear_line(arguments: list[str], word: str) -> None:
-    done = command(*arguments)
-    assert done.returncode == 2
-    assert word in done.stderr
-    assert done.stderr.count("\n") == 1
+def test_misuse_is_one_clear_line(arguments: list[str], word: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["execute", "beverage-serving", *arguments])
+    said = capsys.readouterr().err
+    assert end.value.code == 2
+    assert word in said
+    assert said.count("\n") == 1
 
 
 def test_a_goal_about_an_added_individual_is_reached_by_an_effect_on_all_members_of_its_class() -> None:
