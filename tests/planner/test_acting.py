@@ -358,7 +358,7 @@ def interventions(draw: st.DrawFn) -> Intervention:
     return draw(st.sampled_from(choices))
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(st.lists(interventions(), min_size=1, max_size=2))
 def test_the_goal_is_reached_or_proved_impossible_whatever_people_do(happenings: list[Intervention]) -> None:
     episode = acted(*happenings)
@@ -521,7 +521,7 @@ def test_a_goal_is_impossible_after_the_removal_of_all_objects() -> None:
     assert episode.goal == {}
 
 
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(
     position=st.integers(0, 31),
     inside=st.booleans(),
