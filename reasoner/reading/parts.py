@@ -383,8 +383,16 @@ class Parts(NodeReader):
             return [value for value in inner if value in self.nodes and _is_part(self.nodes[value])]
 
         nodes = closure([iri], parts)
-        bound = {term for node in nodes for term in self.values(node, "witness")}
-        return {value for node in nodes for value in mentioned(node) if value in self.terms} - bound
+        binding = [(term, node) for node in nodes for term in self.values(node, "witness")]
+        bound = {term: closure([node for one, node in binding if one == term], parts) for term, _ in binding}
+        for node in sorted(nodes):
+            for term in sorted(bound.keys() & {*mentioned(node)}):
+                if node not in bound[term]:
+                    raise KnowledgeError(
+                        f"<{node}>: {local_name(term)} is the c:witness of another condition, and has no meaning outside of it; "
+                        "declare another c:Variable"
+                    )
+        return {value for node in nodes for value in mentioned(node) if value in self.terms} - bound.keys()
 
 
 def _plain(condition: Condition) -> bool:

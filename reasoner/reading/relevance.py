@@ -15,6 +15,7 @@ until a query finds no new individual. If the task has no plan in the complete s
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
@@ -65,6 +66,11 @@ ROUNDS = 6
 individuals, one query with a property path completes the slice.
 """
 FREE, RELATION, BACKWARD, FROM_CONSTANT = range(4)  # costs of steps; the cheapest step to a term is chosen
+WORD = re.compile(r"""([^\x00-\x20<>"{}|^`\\#/:%]|%[0-9A-Fa-f]{2})+""")
+IRI = re.compile(
+    r"""[A-Za-z][A-Za-z0-9+.-]*://([^\x00-\x20<>"{}|^`\\#%]|%[0-9A-Fa-f]{2})+(#([^\x00-\x20<>"{}|^`\\#%]|%[0-9A-Fa-f]{2})*)?"""
+)
+"""Forms of words in goals: a name that may be a part of an IRI, and an IRI."""
 
 
 @dataclass
@@ -122,7 +128,7 @@ def recognise(graph: KnowledgeGraph, goals: Sequence[str] = ()) -> Reading:
     fresh = search.visit(seeds | constants)
     check(RECOGNISING)
     lifted = frame(schema, [member for member in search.members() if member[0] in constants])
-    bounds = routes(lifted, [goal.split()[1] for goal in goals if " " in goal.strip()])
+    bounds = routes(lifted, _situations_in(goals, lifted))
     search.close(fresh, constants, bounds)
     members = search.members()
     known = frame(schema, members, _namesakes(graph, schema, members), lifted)
@@ -167,11 +173,15 @@ def routes(known: Frame, more_situations: Iterable[str] = ()) -> Routes:
                 one.follow(known, found, looked_up)
                 counting |= one.situations
                 changed |= one.behavior.changes
-        for aggregate in known.domain.aggregates.values():
+        following = set(changed)
+        for aggregate in known.domain.aggregates.values():  # totals come after the totals that they add up
+            if not read_by(aggregate) & following:
+                continue
+            following.add(aggregate.situation)
             quantity = known.domain.situations[aggregate.situation].quantity
-            if quantity is not None and quantity.bounded and read_by(aggregate) & changed:
+            if quantity is not None and quantity.bounded:
                 counting.add(aggregate.situation)  # the bounds of the total restrict behaviours
-                _span_to_totals(aggregate, changed, known, found, looked_up)
+                _span_to_totals(aggregate, following, known, found, looked_up)
     return found
 
 
@@ -184,7 +194,8 @@ def _span_to_totals(aggregate: Aggregate, changed: set[str], known: Frame, found
                 _span(scope, {*condition.arguments, condition.value}, named, known, found, looked_up)
                 left -= {condition.situation}
     if left:  # the facts occur in nested conditions
-        found.classes.update(known.names.iri(parameter.kind) for parameter in aggregate.parameters)
+        kinds = (kind for parameter in aggregate.parameters for kind in parameter.kind.split("|"))
+        found.classes.update(map(known.names.iri, kinds))
 
 
 LookedUp: TypeAlias = "dict[tuple[str, int], set[str]]"
@@ -505,20 +516,27 @@ def _goal_classes(schema: OntologySchema) -> set[str]:
     return wanted | {v for node in negated for v in node.get(CORE + "situationType", ()) if v not in schema.pairs}
 
 
+def _situations_in(goals: Sequence[str], known: Frame) -> set[str]:
+    """Return the situation types that goals name; the whole scene may have a longer name for a situation type than `known`."""
+    named = {local_name(goal.split()[1]) for goal in goals if " " in goal.strip()}
+    return {name for name in known.domain.situations if local_name(name) in named}
+
+
 def _named(graph: KnowledgeGraph, schema: OntologySchema, goals: Sequence[str]) -> set[str]:
     """Return the IRIs of the individuals that goals name; known namespaces are searched before all individuals."""
-    words = {word.rsplit(":", 1)[-1] for goal in goals for word in goal.split() if not BOUNDS.fullmatch(word)}
+    given = {word for goal in goals for word in goal.split()}
+    words = {name for word in given if WORD.fullmatch(name := local_name(word))}
     if not words:
         return set()
     spaces = _spaces(graph, schema, chain(schema.nodes, schema.supers, _goal_individuals(schema)))
+    iris = {space + word for space in spaces for word in words} | {word for word in given if IRI.fullmatch(word)}
     rows = graph.select(
-        f"SELECT ?x WHERE {{ VALUES ?x {{ {values_of(space + word for space in spaces for word in words)} }} "
-        "FILTER EXISTS { ?x a owl:NamedIndividual } }",
+        f"SELECT ?x WHERE {{ VALUES ?x {{ {values_of(sorted(iris))} }} FILTER EXISTS {{ ?x a owl:NamedIndividual }} }}",
         SCENE,
     )
     found = {text(x) for (x,) in rows}
     terms = {local_name(iri) for iri in (*found, *schema.nodes, *schema.supers)} | {TRUE, FALSE}
-    if lost := words - terms:
+    if lost := {word for word in words - terms if not BOUNDS.fullmatch(word)}:
         rows = graph.select(
             "SELECT DISTINCT ?x WHERE { ?x a owl:NamedIndividual . "
             f"VALUES ?word {{ {' '.join(str(ox.Literal(word)) for word in sorted(lost))} }} "
