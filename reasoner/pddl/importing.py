@@ -14,7 +14,7 @@ action                          behaviour on level 1, all of whose variables are
 cost that depends on objects    one behaviour per cost
 function that never changes     static relation, whose last argument is the number
 any other function              situation type whose values are amounts, unless it only counts cost
-goal that isn't a fact          precondition of the behaviour ``REACH_GOAL``, whose effect is the goal
+goal that isn't a fact          boolean situation type ``GOAL_REACHED`` with a rule
 ==============================  ================================================================
 
 Invariant synthesis finds mutually exclusive predicates. At most one of several mutually exclusive predicates holds for an object
@@ -34,7 +34,7 @@ from math import prod
 
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, Quantity, bounds_written, written
 from confab.reasoner.derivation import circles
-from confab.reasoner.pddl.declarations import COMPARISONS, Pddl, Typed
+from confab.reasoner.pddl.declarations import COMPARISONS, Axiom, Pddl, Typed
 from confab.reasoner.pddl.forms import (
     Atom,
     NumericEffect,
@@ -77,7 +77,6 @@ from confab.reasoner.symbols import (
 
 THING = "Thing"
 """The class of all objects, PDDL's ``object``."""
-REACH_GOAL = "reach-goal"
 WORLD, THE_WORLD = "World", "the_world"
 """A class with a single individual, which is the argument of situation types for predicates without arguments."""
 BASE = "https://w3id.org/confab/pddl/"
@@ -103,9 +102,8 @@ class Imported:
     said: Mapping[str, str]
 
     def line(self, behavior: str, arguments: Sequence[str]) -> str:
-        """Return a step in PDDL's notation of plans, or an empty text for ``REACH_GOAL``, which has no PDDL action."""
-        action = self.said.get(behavior, behavior)
-        return " ".join((action, *(self.said.get(a, a) for a in arguments))) if action != REACH_GOAL else ""
+        """Return a step in PDDL's notation of plans."""
+        return " ".join(self.said.get(word, word) for word in (behavior, *arguments))
 
 
 def imported(pddl: Pddl, scene: str | None = None, level: int = 1) -> Imported:
@@ -163,6 +161,7 @@ class _Import:
         self.changing |= self.happening | self.pddl.remembers.keys()
         self.sets = {kind: frozenset(self.pddl.of_type(kind)) for kind in self.pddl.types}
         self.facts = dict.fromkeys(self.pddl.initial)
+        self.axioms = [*self.pddl.axioms]
 
     # -------------------------------------------------------------------------------------------------- names
 
@@ -222,15 +221,11 @@ class _Import:
         situations = self.situations(classes, parents)
         behaviors = {b.name: b for b in map(self.behavior, pddl.actions) if b is not None}
         initial = self.initial(situations, classes)
-        goal, reach = self.goal(situations)
+        goal = self.goal(situations)
         weights = self.preferences(situations, goal)
         events, all_happened, times = happenings(self, _Variables(self), situations, classes)
         behaviors |= {event.name: event for event in events}
         goal |= all_happened
-        if reach:
-            behaviors[reach.name] = reach
-        elif ("situation", "goal reached") in self.names:
-            initial |= goal
         rules = self.rules()
         if any(s.arguments == (WORLD,) for s in situations.values()):
             classes[WORLD] = (THE_WORLD,)
@@ -251,7 +246,7 @@ class _Import:
             The value of a derived predicate depends on its own negation.
         """
         found: dict[str, tuple[Rule, ...]] = {}
-        for axiom in self.pddl.axioms:
+        for axiom in self.axioms:
             name, variables = self.places[axiom.predicate].situation, _Variables(self)
             parameters = [Parameter(self.term(p.name), self.kind(p.type)) for p in axiom.parameters]
             conditions = self.simplified(c for form in conjuncts(axiom.condition) for c in variables.condition(form))
@@ -333,28 +328,22 @@ class _Import:
                 found[Symbol(condition.situation, condition.arguments)] = condition.value
         return found
 
-    def goal(self, situations: dict[str, SituationType]) -> tuple[dict[Symbol, str], Behavior | None]:
-        """Return the goal as values of symbols, and the behaviour ``REACH_GOAL``.
+    def goal(self, situations: dict[str, SituationType]) -> dict[Symbol, str]:
+        """Return the goal as values of symbols.
 
-        The preconditions of ``REACH_GOAL`` are the conjuncts of the PDDL goal. The behaviour ``REACH_GOAL`` is None if all
-        conjuncts of the goal are facts or always hold.
+        If some conjuncts of the PDDL goal aren't facts, all these conjuncts together become the situation type ``GOAL_REACHED``
+        with a rule.
         """
         found: dict[Symbol, str] = {}
-        parts = list(conjuncts(self.pddl.goal))
-        single = [one for part in parts for one in spread(part, self.pddl.of_type, self.holds)]
-        if single and not [one for one in single if not self.plain(one, situations, found)]:
-            return found, None
-        name = self.name("situation", "goal reached", "GOAL_REACHED")
-        situations[name] = SituationType(name, (WORLD,), "Truth", default=FALSE, boolean=True)
-        goal, variables = {**found, Symbol(name, (THE_WORLD,)): TRUE}, _Variables(self)
-        if not single:
-            return goal, None
-        conditions = self.simplified(c for part in parts for c in variables.condition(part))
-        if conditions is None:  # no action can reach the goal
-            conditions = (ValueCondition(name, (THE_WORLD,), TRUE),)
-        effect = ValueEffect(name, (THE_WORLD,), TRUE)
-        reach = Behavior(self.name("action", REACH_GOAL, "REACH_GOAL"), self.level, (), (), conditions, (effect,), 0.0)
-        return goal, reach
+        parts = [one for part in conjuncts(self.pddl.goal) for one in spread(part, self.pddl.of_type, self.holds)]
+        left = [one for one in parts if not self.plain(one, situations, found)]
+        if left or not (parts or self.pddl.preferences or self.pddl.timed):  # a task needs a goal
+            name = self.name("situation", "goal reached", "GOAL_REACHED")
+            situations[name] = SituationType(name, (WORLD,), "Truth", default=FALSE, boolean=True)
+            self.places["goal reached"] = PredicateTranslation(name)
+            self.axioms.append(Axiom("goal reached", (), Form((PddlWord("and", 0, 0), *left), 0, 0)))
+            found[Symbol(name, (THE_WORLD,))] = TRUE
+        return found
 
     def preferences(self, situations: Mapping[str, SituationType], goal: dict[Symbol, str]) -> dict[Symbol, Fraction]:
         """Add the soft goals to the goal, and return their weights in the metric. A soft goal without a weight is omitted.

@@ -124,7 +124,7 @@ class Invariants:
 
     @cached_property
     def mentioned(self) -> list[tuple[str, list[frozenset[str]]]]:
-        """The predicate of every atom in conditions, effects and the goal, with the objects that each of its terms may denote."""
+        """The predicate of every atom in conditions, effects and goals, with the objects that each of its terms may denote."""
         found = []
         for _name, action in self.pddl.actions.items():
             forms = [form for form in (action.precondition, action.effect) if form]
@@ -133,7 +133,8 @@ class Invariants:
                     (atom[0], [self.sets[own[t]] if t in own else self.domain_of(action, t) for t in atom[1:]])
                 )
         others = [(axiom.condition, {p.name: p.type for p in axiom.parameters}) for axiom in self.pddl.axioms]
-        for form, types in [*others, *([(self.pddl.goal, dict[str, str]())] if self.pddl.goal else [])]:
+        goals = [form for form in (self.pddl.goal, *self.pddl.preferences.values()) if form]
+        for form, types in [*others, *((goal, dict[str, str]()) for goal in goals)]:
             for atom, own in atoms_in(form, self.pddl.predicates, types):
                 found.append((atom[0], [self.sets[own[t]] if t in own else frozenset({t}) for t in atom[1:]]))
         return found

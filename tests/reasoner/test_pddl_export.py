@@ -51,7 +51,7 @@ def read_by_unified_planning(domain: str, problem: str) -> None:
 
 
 def least(problem: Problem, level: int | None = None, most: int = MOST) -> float | None:
-    level = problem.domain.levels[-1] if level is None else level
+    level = max(problem.domain.levels, default=1) if level is None else level
     found = Interpreter(replace(problem, goal=problem.goal_on(level))).explored(level, most, rests=False).least
     return None if found is None else float(found)
 
@@ -91,7 +91,7 @@ def test_a_domain_keeps_its_meaning_when_it_is_imported_and_exported(tmp_path: P
     found = imported(parse_files(*files)).problem
     assert plan_level(found).status is plan_level(round_trip(found)).status is status
     import_pddl(*files, tmp_path / "scene.ttl")
-    assert validate([tmp_path / "scene.ttl"]) == []
+    assert all(finding.severity == "remark" for finding in validate([tmp_path / "scene.ttl"]))
 
 
 def test_an_import_that_planning_could_not_use_is_refused_and_writes_no_file(tmp_path: Path) -> None:
