@@ -91,7 +91,7 @@ def carried_out(
     """
     rules = BehaviorReader(problem, lookups, lifted)
     check = _PlanExecution(problem, max((step.level for step in plan.walk()), default=0), rules)
-    if check.carried_out(plan.steps, 0, (), "the plan"):
+    if check.carried_out(plan.steps, 0, (), "the plan") is not None:
         for fact, got in _unreached(problem, check.facts):
             check.fault((), f"the goal {fact.symbol} = {fact.value} isn't reached: it is {got} in the end")
     return check.faults
@@ -154,55 +154,48 @@ class _PlanExecution:
 
     def carried_out(
         self, steps: Sequence[Step], above: int, path: tuple[int, ...], what: object, inside: bool = False
-    ) -> bool:
-        """Execute the steps that refine a step of level `above`, or the task (level 0); return whether all were applicable.
+    ) -> set[Cell] | None:
+        """Execute the steps that refine a step of level `above`, or the task (level 0).
 
+        Return the symbols that a step has changed, even if a later step has changed them back, or None if a step wasn't applicable.
         In the task, the goal of a symbol takes precedence over the symbol's rest value. If `inside` is true, the steps refine a
         step, and the rest value is required. Runs of consecutive lower-level steps may replace steps of the next level.
         """
         level = next((level for level in self.levels if level > above), above)
-        marks = []
+        touched = set[Cell]()
         for part in stretches(steps, level):
             check("checking the plan")
-            marks.append(len(self.facts.log))
             if part[0].level <= above:
                 self.fault(part[0].path, f"{part[0]} of level {part[0].level} can't refine {what} of level {above}")
-                return False
+                return None
             if part[0].level > level:
                 stretch = f"the stretch from {part[0]} to {part[-1]}"
-                done = self.carried_out(part, level, part[0].path, stretch, inside)
+                changed = self.carried_out(part, level, part[0].path, stretch, inside)
             else:
-                done = self.step(part[0])
-            if not done:
-                return False
-        for symbol, got, rest in self.restless(marks):
-            if above < self.problem.first_level(symbol) <= level and (inside or symbol not in self.problem.goal):
+                changed = self.step(part[0])
+            if changed is None:
+                return None
+            touched |= changed
+        for cell in sorted(cell for cell in touched if cell[0] in self.rests):
+            symbol, got, rest = Symbol(*cell), self.facts.value(*cell) or FALSE, self.rests[cell[0]]
+            own = above < self.problem.first_level(symbol) <= level
+            if got != rest and own and (inside or symbol not in self.problem.goal):
                 self.fault(path, f"{what} touches {symbol} and leaves it {got}; at rest it is {rest}")
-        return True
+        return touched
 
-    def restless(self, marks: Sequence[int]) -> Iterator[tuple[Symbol, str, str]]:
-        """Yield the symbols that aren't at rest and have changed since a mark of the log, with their values and rest values."""
-        first, now = marks[0] if marks else len(self.facts.log), self.facts.value
-        changed = {
-            (situation, arguments) for situation, arguments, _ in self.facts.log[first:] if situation in self.rests
-        }
-        course: dict[Cell, list[tuple[int, str]]] = {cell: [] for cell in changed if now(*cell) != self.rests[cell[0]]}
-        for i, (situation, arguments, old) in enumerate(self.facts.log[first:], first) if course else ():
-            if (situation, arguments) in course:
-                course[situation, arguments].append((i, old))
-        for cell, olds in sorted(course.items()):
-            got = now(*cell) or FALSE
-            if any(next((old for i, old in olds if i >= mark), got) != got for mark in marks):
-                yield Symbol(*cell), got, self.rests[cell[0]]
+    def step(self, step: Step) -> set[Cell] | None:
+        """Execute one step with its refinement; return the symbols that it changes.
 
-    def step(self, step: Step) -> bool:
-        """Execute one step with its refinement; return whether the step and its sub-steps were applicable."""
+        Return None if the step or a sub-step wasn't applicable. Changes inside of a refinement count only if they last; of steps
+        that are refined together, the changes that each of them states count.
+        """
         if step.joined and not self.joinable(step):
-            return False
+            return None
         mark = len(self.facts.log)
-        wanted = self.stated(step)
-        if wanted is None:
-            return False
+        stated = self.stated(step)
+        if stated is None:
+            return None
+        wanted, touched = stated
         level = self.problem.domain.behaviors[step.behavior].level
         if not step.steps:
             for (situation, arguments), value in wanted.items():
@@ -210,9 +203,9 @@ class _PlanExecution:
             self.rules.remember(self.facts)
             if level < self.depth and self.facts.since(mark):
                 self.fault(step.path, f"{step}: it has no refinement, but other steps have one")
-            return self.within_bounds(step)
-        if not self.carried_out(step.steps, level, step.path, step, inside=True):
-            return False
+            return touched.union(self.facts.since(mark)) if self.within_bounds(step) else None
+        if self.carried_out(step.steps, level, step.path, step, inside=True) is None:
+            return None
         totals = self.problem.domain.aggregates  # a level determines only the totals that the level sees
         said = {**self.facts.since(mark), **wanted}  # other symbols keep their values
         for cell in sorted([cell for cell, value in said.items() if self.facts.value(*cell) != value]):
@@ -221,7 +214,7 @@ class _PlanExecution:
             symbol, got = Symbol(*cell), self.facts.value(*cell) or FALSE
             if (cell in wanted and cell[0] not in totals) or self.problem.sees(level, symbol, said[cell]):
                 self.fault(step.path, f"{step}: its refinement leaves {symbol} = {got}, not {said[cell]}")
-        return True
+        return touched.union(self.facts.since(mark))
 
     def joinable(self, step: Step) -> bool:
         """Return whether steps that are refined together are of one level and share their sub-steps; record a fault if not."""
@@ -234,15 +227,17 @@ class _PlanExecution:
         )
         return False
 
-    def stated(self, step: Step) -> dict[Cell, str] | None:
-        """Return the values that a step, or steps that are refined together, state; the facts are unchanged.
+    def stated(self, step: Step) -> tuple[dict[Cell, str], set[Cell]] | None:
+        """Return the values that a step, or steps that are refined together, state, and the symbols that they change.
 
-        Steps that are refined together are applied one after another. Return None if one of the steps isn't applicable.
+        The facts are unchanged. Steps that are refined together are applied one after another. Return None if one of the steps
+        isn't applicable.
         """
-        mark, exceptions = len(self.facts.log), dict(self.exceptions)
+        mark, exceptions, touched = len(self.facts.log), dict(self.exceptions), set[Cell]()
         wanted: dict[Cell, str] = {}
         made, last = self.changes(step), step
         for one in step.joined if made is not None else ():
+            touched |= self.different(made or {})
             wanted |= made or {}
             for (situation, arguments), value in wanted.items():
                 self.facts.put(situation, arguments, value)
@@ -252,9 +247,14 @@ class _PlanExecution:
             made, last = self.changes(one) if allowed else None, one
             if made is None:
                 break
+        touched |= self.different(made or {})
         self.facts.undo(mark)
         self.exceptions = exceptions
-        return None if made is None else wanted | made
+        return None if made is None else (wanted | made, touched)
+
+    def different(self, made: Mapping[Cell, str]) -> set[Cell]:
+        """Return the symbols that have another value now than in `made`."""
+        return {cell for cell, value in made.items() if self.facts.value(*cell) != value}
 
     def changes(self, step: Step) -> dict[Cell, str] | None:
         """Return the values that a step gives to symbols in the current state; record a fault if the step isn't applicable.

@@ -38,8 +38,13 @@ class _Walk:
         kinds = self.problem.domain.situations
         self.rests = [slot for slot, symbol in enumerate(self.of.symbols) if kinds[symbol.situation].rest is not None]
 
-    def sequence(self, steps: Sequence[Step], above: int, state: State, inside: bool) -> State | None:
-        """Execute the steps that refine a step of level `above`, where level 0 is the task; return the final state."""
+    def sequence(
+        self, steps: Sequence[Step], above: int, state: State, inside: bool, outer: set[int] | None = None
+    ) -> State | None:
+        """Execute the steps that refine a step of level `above`, where level 0 is the task; return the final state.
+
+        The symbols that steps of the sequence change are added to `outer`, even if a later step changes them back.
+        """
         level = next((level for level in self.levels if level > above), None)
         if level is None:
             if steps:
@@ -51,11 +56,11 @@ class _Walk:
         while position < len(steps):
             before, last = state, position + 1
             if steps[position].level == level:
-                after = self.step(steps[position], state)
+                after = self.step(steps[position], state, touched)
             elif steps[position].level > level:
                 while last < len(steps) and steps[last].level > level:
                     last += 1
-                after = self.sequence(steps[position:last], level, state, inside)
+                after = self.sequence(steps[position:last], level, state, inside, touched)
             else:
                 self.faults.append("a step has a higher level than its parent")
                 return None
@@ -63,6 +68,8 @@ class _Walk:
                 return None
             position, state = last, after
             touched |= {slot for slot in self.rests if before[slot] != state[slot]}
+        if outer is not None:
+            outer |= touched
         for slot in touched:
             symbol = self.of.symbols[slot]
             at_rest = state[slot] == self.problem.domain.situations[symbol.situation].rest
@@ -71,14 +78,22 @@ class _Walk:
                 self.faults.append(f"{symbol} is left {state[slot]}, not at rest")
         return state
 
-    def step(self, step: Step, state: State) -> State | None:
-        """Execute a step, or steps that are refined together, with the refinement; return the final state."""
+    def step(self, step: Step, state: State, touched: set[int]) -> State | None:
+        """Execute a step, or steps that are refined together, with the refinement; return the final state.
+
+        The symbols that steps which are refined together state to change are added to `touched`.
+        """
         made = [state]
         for one in step.together:
             if step.joined and (one.level != step.level or not step.steps or (one is not step and one.steps)):
                 self.faults.append(f"{step} can't be refined together")
                 return None
-            made = [after for before in made for _, after in self.of.done(one.behavior, one.arguments, before)]
+            done = [
+                (before, after) for before in made for _, after in self.of.done(one.behavior, one.arguments, before)
+            ]
+            made = [after for _, after in done]
+            if step.joined and len(done) == 1:
+                touched |= {slot for slot in self.rests if done[0][0][slot] != done[0][1][slot]}
         if not made:
             self.faults.append(f"{step} can't be done")
             return None

@@ -252,9 +252,12 @@ def without_grounding(call: Call, trials: int) -> bool:
     """Search the lowest level without grounding; return whether the steps of the call are a plan now."""
     from confab.planner.hierarchical.ungrounded import UngroundedSearch
 
-    steps = UngroundedSearch(call, trials).plan()
-    call.steps = steps or call.steps
-    return steps is not None
+    before, steps = call.steps, UngroundedSearch(call, trials).plan()
+    call.steps = steps or before
+    if steps is None or left_at_rest(call.problem, call.tree()):
+        return steps is not None
+    call.steps = before
+    return False
 
 
 def no_plan(call: Call, why: str) -> Outcome:
@@ -277,4 +280,20 @@ def flat_first(problem: Problem, limits: Limits, deadline: float | None) -> Outc
     """
     from confab.planner.grounded.best_first import plan_level
 
-    return plan_level(problem, limits=limits.until(deadline), most_work=FLAT, most_rows=FLAT_ROWS)
+    found = plan_level(problem, limits=limits.until(deadline), most_work=FLAT, most_rows=FLAT_ROWS)
+    if found.plan is None or left_at_rest(problem, found.plan):
+        return found
+    return replace(
+        found, status=Status.GAVE_UP, plan=None, reason=Reason("the plan leaves a changed symbol not at rest")
+    )
+
+
+def left_at_rest(problem: Problem, plan: Plan) -> bool:
+    """Return whether a plan of the lowest level, found by a search of this level alone, leaves all changed symbols at rest.
+
+    Such a search doesn't require that a symbol is at rest in the end if it isn't at rest initially.
+    """
+    rests = {situation.name: situation.rest for situation in problem.domain.situations.values()}
+    return all(rests[s.situation] in (None, value) for s, value in problem.initial.items()) or not validate(
+        problem, plan
+    )

@@ -155,7 +155,7 @@ class UngroundedSearch:
     def _at_rest(self) -> bool:
         """Return whether each symbol without a goal has its rest value or its initial value in the current state."""
         changed = self.table.since(0).keys() - self.call.goal
-        return all(changed.isdisjoint(self.call.restless(level)) for level in self.call.program.levels[1:])
+        return all(changed.isdisjoint(self.call.restless(level)) for level in self.call.program.levels)
 
     def _return_to(self, state: UngroundedState) -> None:
         """Make a state the current state of the table; a long path to the state counts as trials."""

@@ -19,7 +19,7 @@ from confab.planner.hierarchical.unsolvability import Proofs, exhausted
 from confab.planner.levels import levels_left
 from confab.planner.paper.hierarchy import DOUBT
 from confab.planner.paper.hierarchy import plan as paper
-from confab.planner.plan import Outcome, Plan, Reason, Status, UnsolvableError
+from confab.planner.plan import Outcome, Plan, Reason, Status, Step, UnsolvableError, renumbered
 from confab.planner.solve import Request, _proof, solve
 from confab.planner.validation import successor, validate
 from confab.reasoner.pddl.importing import imported
@@ -30,6 +30,8 @@ from tests.planner.small import CASES, Case
 from worlds.agreement import State, complaints, on_top, solvable
 from worlds.families import tabletop
 from worlds.hierarchies import hierarchy, states
+from worlds.interpreter import Interpreter
+from worlds.walking import faults
 from worlds.writing import becomes, behavior, has, world
 
 MODES: dict[str, Callable[[Problem], Outcome]] = {"paper": paper, "default": default}
@@ -316,3 +318,56 @@ def test_the_reason_of_an_exhausted_search_states_the_number_of_states() -> None
     reason = exhausted(shut, 100)
     assert isinstance(reason, Reason)
     assert reason.text == "none of all 1 states of level 2 that can be reached fulfils the goal"
+
+
+def door(*, levels: int) -> Problem:
+    """A door that is open initially and shut at rest; opening it also lights a lamp."""
+    opens = [becomes("DOOR", "door", "open"), becomes("LAMP", "door", TRUE)]
+    moves = [
+        one
+        for level, prefix in ((1, "UPPER_"), (2, ""))[-levels:]
+        for one in (
+            behavior(f"{prefix}OPEN", level if levels > 1 else 1, "", [has("DOOR", "door", "shut")], opens),
+            behavior(
+                f"{prefix}SHUT",
+                level if levels > 1 else 1,
+                "",
+                [has("DOOR", "door", "open")],
+                [becomes("DOOR", "door", "shut")],
+            ),
+        )
+    ]
+    return world(
+        [
+            SituationType("DOOR", ("Door",), "DOOR", rest="shut"),
+            SituationType("LAMP", ("Door",), "Truth", default=FALSE, boolean=True),
+        ],
+        moves,
+        {"Door": ("door",), "DOOR": ("open", "shut")},
+        {"DOOR door": "open"},
+        {"LAMP door": TRUE},
+    )
+
+
+@pytest.mark.parametrize("levels", [1, 2])
+@pytest.mark.parametrize("mode", ["guarded", "optimal", "paper"])
+def test_a_door_that_is_open_initially_is_shut_in_the_end_if_a_step_moves_it(mode: str, levels: int) -> None:
+    outcome = solve(Request(door(levels=levels), mode))
+    assert outcome.plan is not None
+    assert [step.behavior for step in outcome.plan.primitives] == ["SHUT", "OPEN", "SHUT"]
+
+
+def test_a_plan_may_not_leave_a_moved_door_open_however_its_steps_are_grouped() -> None:
+    problem = door(levels=2)
+
+    def step(name: str, *below: Step, joined: tuple[Step, ...] = ()) -> Step:
+        level = problem.domain.behaviors[name].level
+        return Step((0,), problem.id_of(name, ()), level, name, (), {}, None, below, joined)
+
+    shut, open_ = step("SHUT"), step("OPEN")
+    alone = (step("UPPER_SHUT", shut), step("UPPER_OPEN", open_))
+    together = (step("UPPER_SHUT", shut, open_, joined=(step("UPPER_OPEN"),)),)
+    for steps in ((shut, open_), alone, together):
+        plan = Plan(renumbered(steps))
+        assert "leaves it open" in str(validate(problem, plan)[0].text)
+        assert any("left open" in one for one in faults(Interpreter(problem), plan))
