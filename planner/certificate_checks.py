@@ -19,7 +19,7 @@ from itertools import product
 from typing import Generic, TypeAlias, TypeVar
 
 from confab.planner.certificates import Certificate
-from confab.planner.checked_conditions import own_variables, unified
+from confab.planner.checked_conditions import own_variables, undetermined, unified
 from confab.planner.possibilities import Beginning, FactEvaluation, Lowest, Range, WorkLimitError
 from confab.reasoner.amounts import bounds, number, written
 from confab.reasoner.symbols import FALSE, TRUE, Behavior, Fact, Problem, Symbol
@@ -268,8 +268,11 @@ class Cases:
         return None if self.fault else tuple(entries)
 
     def _wrong_at_first(self) -> Iterator[str]:
-        """Yield the claims that don't hold in the initial state, or that no certificate may make."""
+        """Yield the claims that don't hold in the initial state or that no certificate may make, and effects that say nothing."""
         lowest, certificate = self.lowest, self.certificate
+        for behavior in lowest.behaviors:
+            if unknown := undetermined(behavior):
+                yield f"nothing determines {', '.join(unknown)}, which an effect of {behavior.name} names"
         for symbol in (*certificate.always, *certificate.told_apart, *(fact.symbol for fact in certificate.never)):
             if not lowest.exists(symbol.situation, symbol.arguments):
                 yield f"there is no {symbol}"

@@ -22,6 +22,7 @@ from confab.reasoner.symbols import (
     Problem,
     RelationCondition,
     ValueCondition,
+    ValueEffect,
     Witness,
 )
 
@@ -245,6 +246,16 @@ def own_variables(behavior: Behavior) -> frozenset[str]:
     """Return the parameters of a behaviour and the variables that its preconditions determine."""
     found = {parameter.name for parameter in behavior.parameters}
     return frozenset(found.union(*(variables(condition) for condition in behavior.preconditions)))
+
+
+def undetermined(behavior: Behavior) -> list[str]:
+    """Return the variables that effects of a behaviour name although neither its preconditions nor the effect's conditions do."""
+    found, own = set[str](), own_variables(behavior)
+    for effect in behavior.every_effect:
+        named = {effect.value} if isinstance(effect, ValueEffect) else set(terms_of(effect.amount))
+        inner = set[str]().union(*map(variables, effect.when))
+        found |= {term for term in (*effect.arguments, *named) if term.startswith("?")} - inner
+    return sorted(found - own)
 
 
 def unified(

@@ -23,7 +23,7 @@ from confab.reasoner.amounts import (
     situations_in,
     with_amounts,
 )
-from confab.reasoner.language import walk
+from confab.reasoner.language import terms, walk
 from confab.reasoner.symbols import (
     FALSE,
     NEVER,
@@ -33,6 +33,7 @@ from confab.reasoner.symbols import (
     Comparison,
     Condition,
     Effect,
+    Parameter,
     Problem,
     SituationType,
     Span,
@@ -50,6 +51,19 @@ def timing_of(behavior: Behavior) -> Timing:
         return behavior.timing
     conditions = tuple((Span.THROUGHOUT, condition) for condition in behavior.preconditions)
     return Timing(None, (), conditions, tuple((Span.THROUGHOUT, effect) for effect in behavior.every_effect))
+
+
+def fixed_at_begin(behavior: Behavior) -> tuple[Parameter, ...]:
+    """Return the variables that the preconditions of a behaviour determine when a step begins; they keep their individuals."""
+    named = {term for condition in behavior.preconditions for term in terms(condition)}
+    return tuple(variable for variable in behavior.variables if variable.name in named)
+
+
+def with_fixed(behavior: Behavior) -> Behavior:
+    """Return a behaviour whose parameters include the variables that its preconditions determine when a step begins."""
+    fixed = fixed_at_begin(behavior)
+    others = tuple(variable for variable in behavior.variables if variable not in fixed)
+    return replace(behavior, parameters=(*behavior.parameters, *fixed), variables=others)
 
 
 def projected(
@@ -190,16 +204,18 @@ def judged_by_events(problem: Problem) -> bool:
 def by_events(problem: Problem) -> Problem | None:
     """Return a problem in which the begin, the duration and the end of a step are separate behaviours, and which has no times.
 
-    The conditions throughout a step have to hold at some time between its begin and its end. So every timed plan of the given
-    problem gives a plan of this problem: if this problem has no plan, overlapping steps don't help either. Return the given problem
-    if no condition or effect concerns the start or end of a step. Return None if no such problem is known: plans aren't judged by
-    events alone, or an effect at the end depends on the state at the begin.
+    The variables that the preconditions determine are parameters of all parts of a step. The conditions throughout a step have to
+    hold at some time between its begin and its end. So every timed plan of the given problem gives a plan of this problem: if this
+    problem has no plan, overlapping steps don't help either. Return the given problem if no condition or effect concerns the start
+    or end of a step. Return None if no such problem is known: plans aren't judged by events alone, or an effect at the end depends
+    on the state at the begin.
     """
     if not may_overlap_by_need(problem):
         return problem
     behaviors, situations = dict[str, Behavior](), dict(problem.domain.situations)
     for name, one in problem.domain.behaviors.items():
-        timing, its = timing_of(one), tuple(p.name for p in one.parameters)
+        timing, part_of = timing_of(one), with_fixed(one)
+        its, kinds = tuple(p.name for p in part_of.parameters), tuple(p.kind for p in part_of.parameters)
         by_begin = any(
             effect.when or (isinstance(effect, AmountEffect) and situations_in(effect.amount))
             for effect in timing.made(Span.THROUGHOUT)
@@ -210,7 +226,6 @@ def by_events(problem: Problem) -> Problem | None:
         apart = bool(first and (timing.asked(Span.END) or timing.made(Span.END)))
         marks = [f"{name}@{mark}" for mark in ("running", *["held"] * held, *["made"] * apart)]
         for mark in marks:
-            kinds = tuple(p.kind for p in one.parameters)
             situations[mark] = SituationType(mark, kinds, "Truth", one.level, FALSE, FALSE, boolean=True)
         parts = [("begin", timing.asked(Span.START), timing.made(Span.START), marks[:1], FALSE)]
         if held:
@@ -225,7 +240,7 @@ def by_events(problem: Problem) -> Problem | None:
             wanted += [ValueCondition(marks[0], its, TRUE)] if part in ("during", "made") else []
             becomes = FALSE if was == TRUE else TRUE
             behaviors[f"{name}@{part}"] = replace(
-                one,
+                part_of,
                 name=f"{name}@{part}",
                 preconditions=tuple(dict.fromkeys(wanted)),
                 effects=(

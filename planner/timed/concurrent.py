@@ -48,7 +48,7 @@ from confab.reasoner.symbols import (
     ValueCondition,
     ValueEffect,
 )
-from confab.reasoner.timing import only_during, projected, timing_of
+from confab.reasoner.timing import fixed_at_begin, only_during, projected, timing_of, with_fixed
 
 BEGIN, END, RUNNING, HELD, BUSY = "@begin", "@end", "@running", "@held", "@busy"
 FIRST = 0.5
@@ -148,7 +148,7 @@ class _Cut:
                 idle = [ValueCondition(*cell, FALSE) for cell in self.busy(behavior)]
                 behaviors[name] = replace(behavior, preconditions=(*behavior.preconditions, *idle), timing=None)
                 continue
-            kinds = tuple(parameter.kind for parameter in behavior.parameters)
+            kinds = tuple(parameter.kind for parameter in with_fixed(behavior).parameters)
             running = SituationType(name + RUNNING, kinds, "Truth", default=FALSE, boolean=True)
             situations[running.name] = running
             for part in self.parts(behavior, running):
@@ -207,18 +207,19 @@ class _Cut:
 
     def parts(self, behavior: Behavior, running: SituationType) -> Iterator[Behavior]:
         """Yield the begin and the end of a behaviour as two behaviours."""
-        timing, its = timing_of(behavior), tuple(parameter.name for parameter in behavior.parameters)
+        timing, own = timing_of(behavior), with_fixed(behavior)
+        its = tuple(parameter.name for parameter in own.parameters)
         begun = [(Span.START, e) for e in timing.made(Span.START)]
         asked, _ = projected([one for one in timing.conditions if one[0] is not Span.END], begun)
         marks = [(running.name, its), *self.busy(behavior)]
         free = [ValueCondition(*cell, FALSE) for cell in marks]
         made = (*timing.made(Span.START), *(ValueEffect(*cell, TRUE) for cell in marks))
-        yield _behavior(behavior, behavior.name + BEGIN, (*asked, *free), made)
+        yield _behavior(own, behavior.name + BEGIN, (*asked, *free), made)
         pending = [(Span.THROUGHOUT, e) for e in timing.made(Span.THROUGHOUT)]
         last, _ = projected([(Span.END, c) for c in timing.asked(Span.END)], pending)
         held = (*timing.asked(Span.THROUGHOUT), *last)
         made = (*timing.made(Span.THROUGHOUT), *timing.made(Span.END), *(ValueEffect(*cell, FALSE) for cell in marks))
-        ended = _behavior(behavior, behavior.name + END, (*held, replace(free[0], value=TRUE)), made)
+        ended = _behavior(own, behavior.name + END, (*held, replace(free[0], value=TRUE)), made)
         yield replace(ended, cost=0.0, price=None)
 
     def steps(self, task: Task, operators: Sequence[int]) -> tuple[Plan, list[StepEvent]]:
@@ -232,11 +233,14 @@ class _Cut:
             if f"@{part}" == END:
                 events.append((open_.pop((behavior, arguments)), EventKind.END))
                 continue
-            number = len(steps)
-            identity = self.whole.id_of(behavior, arguments)
-            steps.append(Step((number,), identity, task.level, behavior, arguments, bindings))
+            number, whole = len(steps), self.whole.domain.behaviors[behavior]
             if part:
                 open_[behavior, arguments] = number
+                arguments, determined = arguments[: len(whole.parameters)], arguments[len(whole.parameters) :]
+                fixed = (variable.name[1:] for variable in fixed_at_begin(whole))
+                bindings = {**bindings, **dict(zip(fixed, determined, strict=True))}
+            identity = self.whole.id_of(behavior, arguments)
+            steps.append(Step((number,), identity, task.level, behavior, arguments, bindings))
             events.append((number, EventKind.BEGIN if part else EventKind.WHOLE))
         return Plan(tuple(steps)), events
 
@@ -466,7 +470,7 @@ class _Finder:
             behavior = self.cut.whole.domain.behaviors[name.partition("@")[0]]
             timing, part = timing_of(behavior), name.partition("@")[2]
             left_out = {"begin": Span.END, "end": Span.START}.get(part)
-            terms = {p.name: a for p, a in zip(behavior.parameters, arguments, strict=True)}
+            terms = {p.name: a for p, a in zip(with_fixed(behavior).parameters, arguments, strict=False)}
             terms |= {f"?{name}": value for name, value in self.task.describe(operator)[2].items()}
             effects = [
                 e for span, e in timing.effects if span is not left_out and (part != "begin" or span is Span.START)

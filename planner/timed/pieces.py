@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from confab.planner.checked_amounts import worth
-from confab.planner.checked_conditions import Arguments, ConditionReader, variables
+from confab.planner.checked_conditions import Arguments, ConditionReader
 from confab.planner.validation import BehaviorReader, LoggedState
 from confab.reasoner.symbols import (
     AmountEffect,
@@ -30,7 +30,7 @@ from confab.reasoner.symbols import (
     Timing,
     ValueEffect,
 )
-from confab.reasoner.timing import on_each, timing_of
+from confab.reasoner.timing import fixed_at_begin, on_each, timing_of, with_fixed
 
 SECOND = Fraction(1)
 """Default duration of a primitive, in seconds."""
@@ -56,15 +56,13 @@ class Pieces:
 def pieces_of(problem: Problem, behavior: Behavior) -> Pieces:
     """Return the pieces of a behaviour."""
     timing = timing_of(behavior)
-    fixed = _fixed(behavior)
+    fixed, own = fixed_at_begin(behavior), with_fixed(behavior)
 
     def piece(name: str, conditions: Sequence[Condition], effects: Sequence[Effect]) -> Behavior:
         spread = on_each(effects, problem.classes)
         return replace(
-            behavior,
+            own,
             name=f"{behavior.name}@{name}",
-            parameters=(*behavior.parameters, *fixed),
-            variables=tuple(v for v in behavior.variables if v not in fixed),
             preconditions=tuple(conditions),
             effects=tuple(e for e in spread if isinstance(e, ValueEffect)),
             amounts=tuple(e for e in spread if isinstance(e, AmountEffect)),
@@ -77,12 +75,6 @@ def pieces_of(problem: Problem, behavior: Behavior) -> Pieces:
     )
     held = piece("held", timing.asked(Span.THROUGHOUT), ())
     return Pieces(behavior, fixed, timing, begin, middle, end, held)
-
-
-def _fixed(behavior: Behavior) -> tuple[Parameter, ...]:
-    """Return the variables that the preconditions of a behaviour determine."""
-    named = set[str]().union(*map(variables, behavior.preconditions))
-    return tuple(variable for variable in behavior.variables if variable.name in named)
 
 
 def terms_at(rules: BehaviorReader, pieces: Pieces, arguments: Arguments, facts: LoggedState) -> Arguments:
@@ -106,7 +98,7 @@ def duration_of(problem: Problem, behavior: Behavior, arguments: Arguments, fact
         acting = actors_of(problem, behavior, arguments, default_actors(problem)) if times.of_actors else ()
         own = [times.of_actors[behavior.name, a] for a in acting if (behavior.name, a) in times.of_actors]
         return max(own, default=times.measured.get(behavior.name, SECOND))
-    names = [term.name for term in (*behavior.parameters, *_fixed(behavior))]
+    names = [term.name for term in with_fixed(behavior).parameters]
     reader = ConditionReader(BehaviorReader(problem), names)
     its = worth(stated, reader.key, problem.relations)
     seconds = its(facts.value, [*arguments, *list(reader.places)[len(arguments) :]])
@@ -120,9 +112,7 @@ def actors_of(problem: Problem, behavior: Behavior, arguments: Arguments, restin
     """
     stated = timing_of(behavior).actors
     if stated:
-        given: Mapping[str, str] = dict(
-            zip((t.name for t in (*behavior.parameters, *_fixed(behavior))), arguments, strict=False)
-        )
+        given: Mapping[str, str] = dict(zip((t.name for t in with_fixed(behavior).parameters), arguments, strict=False))
         return tuple(dict.fromkeys(given.get(actor, actor) for actor in stated))
     return next(((argument,) for argument in arguments if argument in resting), ())
 

@@ -8,6 +8,7 @@ import pytest
 
 import confab
 from confab.planner.certificate_checks import refusal
+from confab.planner.certificates import Certificate
 from confab.planner.certifying import certify
 from confab.planner.plan import Limits, Outcome, Status
 from confab.planner.solve import Request, solve
@@ -22,9 +23,12 @@ from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AmountEffect,
+    Behavior,
     Comparison,
     Condition,
     Effect,
+    Fact,
+    Parameter,
     Problem,
     SituationType,
     Span,
@@ -32,10 +36,12 @@ from confab.reasoner.symbols import (
     Timing,
     ValueEffect,
 )
-from confab.reasoner.timing import projected
+from confab.reasoner.timing import by_events, projected
 from worlds.timed import Action, TimedWorld, least_makespan, problem_of
 from worlds.writing import becomes, behavior, has, world
 
+Asked = tuple[tuple[Span, Condition], ...]
+Made = tuple[tuple[Span, Effect], ...]
 SPANS = {"s": "at start", "o": "over all", "e": "at end"}
 Literals = str
 """Literals with their spans: ``s q, e !r`` stands for ``(at start (q))`` and ``(at end (not (r)))``."""
@@ -215,7 +221,7 @@ def test_unsolvable_random_worlds_have_no_plan_with_overlaps_either() -> None:
 
 
 AFTER = (Span.END, becomes("G", "?t", TRUE))
-GIVEN: dict[str, tuple[tuple[tuple[Span, Condition], ...], tuple[tuple[Span, Effect], ...]]] = {
+GIVEN: dict[str, tuple[Asked, Made]] = {
     "at its begin, for its whole duration": (
         ((Span.THROUGHOUT, has("P", "?t", TRUE)),),
         ((Span.START, becomes("P", "?t", TRUE)), (Span.END, becomes("P", "?t", FALSE)), AFTER),
@@ -351,9 +357,7 @@ def test_a_task_of_several_levels_whose_steps_have_spans_is_proved_unsolvable() 
     assert refusal(problem, outcome.certificate) is None
 
 
-def spanned(
-    level: int, asked: tuple[tuple[Span, Condition], ...], made: tuple[tuple[Span, Effect], ...], goal: str
-) -> Problem:
+def spanned(level: int, asked: Asked, made: Made, goal: str) -> Problem:
     """Return a task with one behaviour W on a level, whose conditions and effects have spans."""
     preconditions, effects = projected(asked, made)
     values = [effect for effect in effects if isinstance(effect, ValueEffect)]
@@ -370,3 +374,59 @@ def spanned(
         {"N t": "0"},
         {f"{goal} t": TRUE},
     )
+
+
+def looking(determined: bool, meanwhile: bool) -> Problem:
+    """Return a task to look at the hall while the lamp glows; if `determined`, the place of the robot determines what it looks at.
+
+    If `meanwhile`, the robot also has to begin to walk away while it looks.
+    """
+    place, robot = (Parameter("?p", "Place"),), (Parameter("?r", "Robot"),)
+
+    def timed(name: str, seconds: int, asked: Asked, made: Made, more: tuple[Parameter, ...] = robot) -> Behavior:
+        needs, gives = projected(asked, made)
+        values = tuple(effect for effect in gives if isinstance(effect, ValueEffect))
+        return Behavior(name, 1, more, (), needs, values, timing=Timing(Fraction(seconds), (), asked, made))
+
+    def passing(name: str) -> Made:
+        return (Span.START, becomes(name, TRUE)), (Span.END, becomes(name, FALSE))
+
+    asked = ((Span.START, has("AT", "?r", "?p")), (Span.START, has("LIT", TRUE)))
+    seen = *(passing("BUSY") if meanwhile else ()), (Span.END, becomes("SEEN", "?p", TRUE))
+    look = timed("LOOK", 3, asked, seen, robot if determined else (*robot, *place))
+    leave = timed("LEAVE", 1, ((Span.START, has("BUSY", TRUE)),), ((Span.END, becomes("AT", "?r", "attic")),))
+    return world(
+        [
+            SituationType("AT", ("Robot",), "Place"),
+            SituationType("SEEN", ("Place",), "Truth", boolean=True),
+            *(SituationType(name, (), "Truth", boolean=True) for name in ("LIT", "BUSY")),
+        ],
+        [timed("GLOW", 5, (), passing("LIT"), ()), replace(look, variables=place if determined else ()), leave],
+        {"Robot": ("r",), "Place": ("hall", "attic")},
+        {"AT r": "hall"},
+        {"SEEN hall": TRUE, **({"AT r": "attic"} if meanwhile else {})},
+    )
+
+
+@pytest.mark.parametrize("determined", [False, True])
+@pytest.mark.parametrize("meanwhile", [False, True])
+def test_an_effect_at_the_end_of_a_step_may_name_what_a_condition_at_its_begin_determines(
+    determined: bool, meanwhile: bool
+) -> None:
+    problem = looking(determined, meanwhile)
+    timed = schedule_of(solve(Request(problem, limits=Limits(seconds=20.0))))
+    assert timed is not None
+    assert validate_timed(problem, timed) == []
+    events = by_events(problem)
+    assert events is not None
+    assert certify(events) is None
+
+
+def test_the_checker_refuses_a_proof_about_an_effect_that_names_an_unknown_individual() -> None:
+    seen = SituationType("SEEN", ("Place",), "Truth", boolean=True)
+    look = replace(behavior("LOOK", 1, "", [], [becomes("SEEN", "?p", TRUE)]), variables=(Parameter("?p", "Place"),))
+    problem = world([seen], [look], {"Place": ("hall",)}, {}, {"SEEN hall": TRUE})
+    goal = Fact(Symbol("SEEN", ("hall",)), TRUE)
+    said = refusal(problem, Certificate(never=frozenset({goal}), unmet=(goal,)))
+    assert said == "nothing determines ?p, which an effect of LOOK names"
+    assert certify(problem) is None
