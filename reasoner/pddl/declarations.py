@@ -71,7 +71,8 @@ class Pddl:
     timed: list[tuple[Fraction, tuple[str, ...], bool]] = field(default_factory=list)  # time, atom and new truth value
     goal: Form | None = None
     preferences: dict[str, Form] = field(default_factory=dict)  # soft goals
-    minimize: Form | None = None  # the metric that a plan minimises
+    # the weights of functions and of `is-violated NAME` in the metric; None if no metric or only the time is stated
+    metric: dict[str, Fraction] | None = None
 
     def above(self, name: str) -> Sequence[str]:
         """Return a type and all its supertypes, from the nearest supertype to ``object``."""

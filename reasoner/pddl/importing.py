@@ -145,8 +145,8 @@ class _Import:
         wanted = [self.pddl.goal, *self.pddl.preferences.values()]
         read = {word for form in (*forms, *wanted) for word in functions_read(form)}
         changed = {effect.function.head for effects in self.numeric.values() for effect in effects}
-        self.weights = self.costing(changed)
-        self.amounts = changed & (read | (changed - self.weights.keys()))
+        self.weights = {"total-cost": Fraction(1)} if self.pddl.metric is None else self.pddl.metric
+        self.amounts = changed & (read | (changed - self.weights.keys() - {"total-cost"}))
         counted = [e.amount for effects in self.numeric.values() for e in effects]
         conditions = [a.precondition for a in self.pddl.actions.values()]
         conditions += [axiom.condition for axiom in self.pddl.axioms]
@@ -385,7 +385,7 @@ class _Import:
                 return False
             terms = tuple(self.term(w) for w in words_of(function)[1:]) or (THE_WORLD,)
             symbol = Symbol(self.name("situation", f"({function.head})"), terms)
-            wanted = f"{part.head}{limit.text}"
+            wanted = f"{part.head}{written(Fraction(limit.text))}"
             found[symbol] = bounds_written(f"{found[symbol]},{wanted}" if symbol in found else wanted)
             return True
         inner = part.items[1] if part.head == "not" else part
@@ -477,46 +477,31 @@ class _Import:
                 conditions = (*conditions, Comparison(lies.duration, ">=", Fraction(0)))
             behavior = replace(behavior, preconditions=conditions, timing=lies)
         price = self.price(name)
-        if not price and not self.pddl.minimize:
+        if not price and self.pddl.metric is None:
             price = Fraction(1)
-        if price is None or isinstance(price, Fraction):
-            return replace(behavior, cost=max(float(price or 0), 0.0))
+        if isinstance(price, Fraction):
+            if price < 0:
+                raise PddlError(f"action '{name}': its cost is {written(price)}; costs below 0 are not supported")
+            return replace(behavior, cost=float(price))
         return replace(behavior, price=price, preconditions=(*conditions, Comparison(price, ">=", Fraction(0))))
 
-    def price(self, name: str) -> Expression | None:
-        """Return the cost of an action: the weighted sum of the increases of functions in the metric.
-
-        For an action that increases no function in the metric, None is returned.
-        """
-        found: Expression | None = None
+    def price(self, name: str) -> Expression:
+        """Return the cost of an action: the weighted sum of the increases of functions in the metric."""
+        found: Expression = Fraction(0)
         for effect in self.numeric[name]:
-            if effect.function.head not in self.weights or effect.when or effect.variables:
+            weight = self.weights.get(effect.function.head)
+            if weight is None or effect.when or effect.head not in ("increase", "decrease"):
                 continue
-            factor, one = self.weights[effect.function.head], self.number(effect.amount, {})
-            factor = factor if effect.head == "increase" else -factor
-            one = one * factor if isinstance(one, Fraction) else one if factor == 1 else Calculation("*", factor, one)
-            if isinstance(one, Fraction) and isinstance(found, Fraction | None):
-                found = one + (found or 0)
-            else:
-                found = one if found is None else Calculation("+", found, one)
-        return found
-
-    def costing(self, changed: set[str]) -> dict[str, Fraction]:
-        """Return the weight of each function in the metric."""
-        found: dict[str, Fraction] = {"total-cost": Fraction(1)} if "total-cost" in changed else {}
-        waiting: list[tuple[Form, Fraction]] = [(self.pddl.minimize, Fraction(1))] if self.pddl.minimize else []
-        while waiting:
-            form, factor = waiting.pop()
-            numbers = [Fraction(item.text) for item in form.items[1:] if isinstance(item, PddlWord) and is_number(item)]
-            forms = [item for item in form.items[1:] if isinstance(item, Form)]
-            if form.head == "+":
-                waiting += [(one, factor) for one in forms]
-            elif form.head == "*" and len(forms) == 1 and numbers:
-                waiting.append((forms[0], factor * prod(numbers)))
-            elif form.head in changed:
-                found[form.head] = factor
-            elif form.head == "is-violated":
-                found[f"is-violated {words_of(form)[1]}"] = factor
+            factor = weight if effect.head == "increase" else -weight
+            for named in self.instances(effect):
+                one = self.number(effect.amount, named)
+                one = (
+                    one * factor if isinstance(one, Fraction) else one if factor == 1 else Calculation("*", factor, one)
+                )
+                if isinstance(one, Fraction) and isinstance(found, Fraction):
+                    found += one
+                else:
+                    found = Calculation("+", found, one) if found else one
         return found
 
     def number(self, item: PddlWord | Form, named: Mapping[str, str]) -> Expression:

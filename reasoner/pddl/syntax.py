@@ -13,7 +13,6 @@ McDermott et al., "PDDL: the planning domain definition language", 1998; Fox and
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -21,6 +20,7 @@ from pathlib import Path
 
 from confab.reasoner.pddl.declarations import CHANGES, COMPARISONS, Action, Axiom, Pddl, Typed, either
 from confab.reasoner.pddl.durative import Durative, NotTimedError, duration_in, timed, whole
+from confab.reasoner.pddl.metric import Metric
 from confab.reasoner.pddl.words import MOST_BYTES, Form, PddlError, PddlWord, form_of, is_number
 
 SECTIONS = {
@@ -192,10 +192,8 @@ class _Reader:
             wanted = Form((wanted,), wanted.line, wanted.column)
         if wanted is None:
             raise self.fail(form, "the only metric supported is (:metric minimize …)")
-        cost = _timeless(wanted)
-        if cost is not None and cost.head != "total-cost":
-            self.number(cost, {})
-        self.pddl.minimize = cost
+        self.number(wanted, {}, {"total-cost": (), "total-time": (), **self.pddl.functions})
+        self.pddl.metric = Metric(self.pddl, self.fail).weights(wanted)
 
     def typed(self, items: Sequence[PddlWord | Form], declaring: bool = False) -> list[Typed]:
         """Return the names with their types in a list such as ``a b - t c``; a name without a type is an ``object``."""
@@ -516,8 +514,14 @@ class _Reader:
             self.stated(form, "an effect")
             self.atom(form, variables)
 
-    def number(self, item: PddlWord | Form, variables: Mapping[str, str]) -> None:
+    def number(
+        self,
+        item: PddlWord | Form,
+        variables: Mapping[str, str],
+        functions: Mapping[str, tuple[Typed, ...]] | None = None,
+    ) -> None:
         """Check a number, a function term or an arithmetic expression."""
+        functions = self.pddl.functions if functions is None else functions
         if isinstance(item, PddlWord):
             self.constant(item)
         elif item.head in ("+", "-", "*", "/"):
@@ -525,17 +529,17 @@ class _Reader:
             if len(item.items) < 3 - (item.head == "-") or (len(item.items) > 3 and not many):
                 raise self.fail(item, f"({item.head} …) takes 2 numbers, got {len(item.items) - 1}")
             for one in item.items[1:]:
-                self.number(one, variables)
+                self.number(one, variables, functions)
         elif item.head == "is-violated" and len(item.items) == 2:
             name = self.word(item.items[1], "the name of a preference")
             if name.text not in self.pddl.preferences:
                 raise self.fail(name, f"undefined preference '{name.text}'")
         else:
-            self.atom(item, variables, self.pddl.functions, "function")
+            self.atom(item, variables, functions, "function")
 
     def constant(self, word: PddlWord | Form) -> Fraction:
         text = self.word(word, "a number").text
-        if not re.fullmatch(r"[+-]?(\d{1,30}\.?\d{0,30}|\.\d{1,30})(e[+-]?\d{1,2})?", text):
+        if not is_number(word):
             raise self.fail(word, f"wanted a number, got '{text}'")
         return Fraction(text)
 
@@ -622,26 +626,3 @@ class _Reader:
 def _formed(at: Form, head: str, *items: PddlWord | Form) -> Form:
     """Return a form (a list of PDDL) with a given first word, at the position of another form."""
     return Form((PddlWord(head, at.line, at.column), *items), at.line, at.column)
-
-
-def _timeless(form: Form) -> Form | None:
-    """Return a metric without its terms in ``(total-time)``, or None if nothing is left."""
-    if not form.items:
-        return form
-    parts = [_timeless(item) if isinstance(item, Form) else item for item in form.items[1:]]
-    left = [part for part in parts if part is not None]
-    costs = [part for part in left if isinstance(part, Form) or not part.text[:1].isdigit()]
-    if form.head == "total-time" or (len(left) < len(parts) and not costs):
-        return None
-    if len(left) == len(parts):
-        return replace(form, items=(form.items[0], *left))
-    if form.head != "+":
-        raise PddlError("the metric combines (total-time) with a cost; (total-time) may only be added to a cost")
-    (first, *others) = costs
-    return (
-        replace(form, items=(form.items[0], *left))
-        if others
-        else first
-        if isinstance(first, Form)
-        else _formed(form, first.text)
-    )

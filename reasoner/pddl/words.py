@@ -9,6 +9,8 @@ MOST_BYTES = 32 * 2**20
 TOKEN = re.compile(r"[()]|-(?=[A-Za-z])|[^\s();?]+|\?[^\s();?]*|;[^\n]*|\s+")
 """Pattern of a token. A variable begins at its ``?``, as in ``(aircraft?a)``. A type begins at its name, as in ``(?b -boat)``."""
 
+NUMBER = re.compile(r"[+-]?([0-9]{1,30}\.?[0-9]{0,30}|\.[0-9]{1,30})(e[+-]?[0-9]{1,2})?")
+
 
 @dataclass(frozen=True)
 class PddlWord:
@@ -76,4 +78,4 @@ def form_of(text: str, file: str) -> Form:
 
 def is_number(item: PddlWord | Form) -> bool:
     """Return whether an item is a number."""
-    return isinstance(item, PddlWord) and re.fullmatch(r"[+-]?[0-9.]+", item.text) is not None
+    return isinstance(item, PddlWord) and NUMBER.fullmatch(item.text) is not None

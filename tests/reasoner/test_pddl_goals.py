@@ -11,6 +11,7 @@ from confab.planner.plan import Status
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse
 from confab.reasoner.pddl.turtle import turtle
+from confab.reasoner.pddl.words import PddlError
 
 COSTS = "(:functions (total-cost) (f))"
 MAKE = "(:action make :parameters () :effect (and (g) (increase (f) 1) (increase (total-cost) 1)))"
@@ -79,3 +80,76 @@ def test_a_goal_that_a_timed_literal_ends_is_not_reached(goal: str, tmp_path: Pa
      (:durative-action make :parameters () :duration (= ?duration 1) :condition (and) :effect (at end (p)))"""
     problem = f"(:objects o) (:init (q) (at 5 (not (q)))) (:goal (and (p) {goal}))"
     assert cheapest(domain, problem, tmp_path) is None
+
+
+FUELS = """(:predicates (q)) (:functions (total-cost) (fuel) (oil) (rate) (of ?x))
+ (:action a :parameters () :effect (and (q) (increase (fuel) 2) (increase (total-cost) 10)))
+ (:action b :parameters () :effect (and (q) (increase (oil) 3) (increase (total-cost) 1)))
+ (:action c :parameters (?x) :effect (increase (of ?x) 1))
+ (:action d :parameters (?x) :effect (when (q) (increase (rate) 1)))"""
+FUELLED = """(:objects m n) (:init (= (fuel) 0) (= (oil) 0) (= (rate) 2) (= (total-cost) 0) (= (of m) 0) (= (of n) 0))
+ (:goal {})
+ (:metric minimize {}))"""
+
+
+@pytest.mark.parametrize(
+    ("metric", "costs"),
+    [
+        ("(fuel)", (2, 0)),
+        ("(oil)", (0, 3)),
+        ("(total-cost)", (10, 1)),
+        ("(+ (fuel) (+ (fuel) (oil)))", (4, 3)),
+        ("(+ (* 2 (fuel)) (* (oil) 1e1) 7)", (4, 30)),
+        ("(/ (+ (fuel) (oil)) 4)", (0.5, 0.75)),
+        ("(- (total-cost) (- (fuel) (* 2 (oil))))", (8, 7)),
+        ("(* (+ 1 2) (* (fuel) .5))", (3, 0)),
+        ("(+ (total-time) (oil))", (0, 3)),
+    ],
+)
+def test_the_cost_of_an_action_is_its_part_of_the_metric(metric: str, costs: tuple[float, float]) -> None:
+    found = imported(
+        parse(f"(define (domain d) {FUELS})", "(define (problem e) (:domain d) " + FUELLED.format("(q)", metric))
+    )
+    assert tuple(found.problem.domain.behaviors[name].cost for name in "AB") == costs
+
+
+@pytest.mark.parametrize(
+    ("metric", "message"),
+    [
+        ("(* (fuel) (oil))", "problem:3:20: the metric must be a weighted sum; (* …) isn't"),
+        ("(+ (oil) (/ 1 (fuel)))", "problem:3:29: the metric must be a weighted sum; (/ …) isn't"),
+        ("(/ (fuel) 0)", "problem:3:20: the metric must be a weighted sum; (/ …) isn't"),
+        ("(+ (of m) (oil))", "problem:3:23: the terms of 'of' must have the same weight in the metric for all objects"),
+        ("(+ (oil) (rate))", "problem:3:29: action 'd' changes 'rate' under a condition"),
+        ("(- (is-violated x))", "problem:3:23: the violation of preference 'x' reduces the metric"),
+        ("(+ (oil) 1e)", "problem:3:29: wanted a number, got '1e'"),
+    ],
+)
+def test_a_metric_that_no_sum_of_costs_equals_is_refused_with_its_place(metric: str, message: str) -> None:
+    problem = "(define (problem e) (:domain d) " + FUELLED.format("(and (q) (preference x (q)))", metric)
+    with pytest.raises(PddlError) as refused:
+        parse(f"(define (domain d) {FUELS})", problem)
+    assert str(refused.value).startswith(message)
+
+
+def test_an_action_that_reduces_the_metric_is_refused() -> None:
+    problem = "(define (problem e) (:domain d) " + FUELLED.format("(q)", "(- (oil) (fuel))")
+    with pytest.raises(PddlError, match="action 'a': its cost is -2"):
+        imported(parse(f"(define (domain d) {FUELS})", problem))
+
+
+@pytest.mark.parametrize(
+    ("metric", "steps"),
+    [
+        ("(is-violated x)", ["make"]),
+        ("(+ (total-cost) (* .25 (is-violated x)) (/ (is-violated x) 2))", []),
+        ("(+ (total-cost) (is-violated x) (is-violated x))", ["make"]),
+        ("(+ (total-cost) (* 1E+1 (is-violated x)))", ["make"]),
+    ],
+)
+def test_the_weight_of_a_soft_goal_is_its_part_of_the_metric(metric: str, steps: list[str], tmp_path: Path) -> None:
+    problem = (
+        f"(:init (h) (= (f) 0) (= (total-cost) 0)) (:goal (and (h) (preference x (g)))) (:metric minimize {metric})"
+    )
+    unmake = "(:action unmake :parameters () :effect (not (h)))"
+    assert cheapest(f"(:predicates (g) (h)) {COSTS} {MAKE} {unmake}", problem, tmp_path) == steps
