@@ -5,15 +5,28 @@ This module shares no code with any search.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import TypeAlias
 
 from confab.planner.checked_amounts import worth
-from confab.planner.checked_conditions import ConditionReader, ReadableState, Source, Values, all_hold
-from confab.reasoner.amounts import written
+from confab.planner.checked_conditions import ConditionReader, ReadableState, Source, Values, all_hold, variables
+from confab.reasoner.aggregates.dependencies import read_by
+from confab.reasoner.amounts import Amount, inside, written
+from confab.reasoner.closure import closure
 from confab.reasoner.derivation import strata
-from confab.reasoner.symbols import Aggregate, ClassCondition, Rule
+from confab.reasoner.symbols import (
+    Aggregate,
+    AnyOf,
+    ClassCondition,
+    Comparison,
+    Condition,
+    Rule,
+    ValueCondition,
+    Witness,
+    substituted,
+)
 
 Cell: TypeAlias = "tuple[str, tuple[str, ...]]"
 
@@ -94,3 +107,105 @@ class Total:
         self._found = {}
         all_hold(self._tests, facts, [*arguments, *self._terms[len(arguments) :]])
         return written(sum(self._found.values(), Fraction(0)))
+
+
+class BoundedTotals:
+    """The totals with bounds that a change can affect; `note` adds the individuals that determine these totals to the lookups."""
+
+    def __init__(self, rules: Source, bounded: Iterable[str]) -> None:
+        aggregates = rules.problem.domain.aggregates
+        self._uses: dict[str, list[_Use]] = defaultdict(list)
+        for name in sorted(closure(bounded, lambda name: read_by(aggregates[name]) & aggregates.keys())):
+            for situation, use in _uses(rules, aggregates[name]):
+                self._uses[situation].append(use)
+
+    def note(self, facts: ReadableState, changes: Mapping[Cell, Iterable[str]]) -> None:
+        """Look up everything on which the totals depend that changed symbols affect; `changes` has the old and new values."""
+        waiting, seen = list(changes.items()), set(changes)
+        while waiting:
+            (situation, arguments), values = waiting.pop()
+            for use in self._uses.get(situation, ()):
+                fresh = use.totals(facts, arguments, values) - seen
+                seen |= fresh
+                waiting += [(cell, ()) for cell in sorted(fresh)]
+
+
+class _Use:
+    """The place of a changing symbol in the conditions or the number of an aggregate.
+
+    `conditions` are all other conditions, including those around and inside the nested conditions in which the symbol occurs.
+    `terms` are the arguments of the symbol, and its value if `valued` is true.
+    """
+
+    def __init__(
+        self,
+        rules: Source,
+        aggregate: Aggregate,
+        terms: tuple[str, ...],
+        valued: bool,
+        conditions: Sequence[Condition],
+        kinds: Mapping[str, str],
+    ) -> None:
+        self._terms, self._valued, self._situation = terms, valued, aggregate.situation
+        bound = kinds.keys() & {*terms}
+        reading = ConditionReader(rules, kinds)
+        self._owner = reading.key([p.name for p in aggregate.parameters])
+        self._whole = reading.conjunction(aggregate.conditions, {*kinds}, kinds)
+        loose = bound | kinds.keys() - set().union(*map(variables, conditions))
+        asked = [*conditions, *(ClassCondition(name, kinds[name]) for name in kinds if name in loose)]
+        self._found: set[Cell] = set()
+        self._tests = reading.conjunction(asked, bound, kinds, [self._added])
+        self._places = tuple(reading.places)
+
+    def _added(self, facts: ReadableState, values: Values) -> bool:
+        """Add the total of a solution, and return False to request the next solution."""
+        all_hold(self._whole, facts, values.copy())
+        self._found.add((self._situation, self._owner(values)))
+        return False
+
+    def totals(self, facts: ReadableState, arguments: tuple[str, ...], values: Iterable[str]) -> set[Cell]:
+        """Return the totals that depend on a symbol in this place, if the symbol has one of the values."""
+        self._found = set()
+        for words in ((*arguments, value) for value in values) if self._valued else (arguments,):
+            given = dict(zip(self._terms, words, strict=True))
+            if all(
+                given[t] == word and (t.startswith("?") or t == word)
+                for t, word in zip(self._terms, words, strict=True)
+            ):
+                all_hold(self._tests, facts, [given.get(term, term) for term in self._places])
+        return self._found
+
+
+def _uses(rules: Source, aggregate: Aggregate) -> Iterator[tuple[str, _Use]]:
+    """Yield each use of a changing symbol in an aggregate, with the situation type of the symbol."""
+    counted = Comparison(aggregate.amount, "=", aggregate.amount)
+    for leaf, others, kinds in _leaves((counted, *aggregate.conditions), aggregate.kinds):
+        if isinstance(leaf, ValueCondition):
+            yield leaf.situation, _Use(rules, aggregate, (*leaf.arguments, leaf.value), True, others, kinds)
+        elif isinstance(leaf, Comparison):
+            for part in dict.fromkeys((*inside(leaf.left), *inside(leaf.right))):
+                if isinstance(part, Amount):
+                    yield part.situation, _Use(rules, aggregate, part.arguments, False, others, kinds)
+
+
+def _leaves(
+    conditions: Sequence[Condition], kinds: Mapping[str, str]
+) -> Iterator[tuple[Condition, tuple[Condition, ...], Mapping[str, str]]]:
+    """Yield each simple condition, the conditions with which it is in one conjunction, and the classes of their variables."""
+    for i, condition in enumerate(conditions):
+        others, groups = (*conditions[:i], *conditions[i + 1 :]), list[Sequence[Condition]]()
+        its = dict(kinds)
+        match condition:
+            case Witness(variable, kind, inner):
+                name = variable
+                while name in kinds:
+                    name += "'"
+                its[name] = kind
+                groups = [[substituted(c, {variable: name}) for c in inner]]
+            case AnyOf(alternatives):
+                groups = [*alternatives]
+            case _:
+                yield condition, others, kinds
+        for group in groups:
+            for leaf, rest, of in _leaves(group, its):
+                yield leaf, (*others, *rest), of

@@ -23,7 +23,7 @@ from typing import TypeAlias
 
 from confab.planner.checked_amounts import changed, worth
 from confab.planner.checked_conditions import Arguments, Bindings, ConditionReader, Lookups, Values, all_hold
-from confab.planner.checked_definitions import DefinedValues, Total, stratum_of
+from confab.planner.checked_definitions import BoundedTotals, DefinedValues, Total, stratum_of
 from confab.planner.plan import Plan, Step
 from confab.reasoner.amounts import Quantity, meets
 from confab.reasoner.limits import check
@@ -203,7 +203,7 @@ class _PlanExecution:
             self.rules.remember(self.facts)
             if level < self.depth and self.facts.since(mark):
                 self.fault(step.path, f"{step}: it has no refinement, but other steps have one")
-            return touched.union(self.facts.since(mark)) if self.within_bounds(step) else None
+            return touched.union(self.facts.since(mark)) if self.within_bounds(step, mark) else None
         if self.carried_out(step.steps, level, step.path, step, inside=True) is None:
             return None
         totals = self.problem.domain.aggregates  # a level determines only the totals that the level sees
@@ -243,7 +243,7 @@ class _PlanExecution:
                 self.facts.put(situation, arguments, value)
             level = self.problem.domain.behaviors[last.behavior].level
             self.rules.remember(self.facts, level)
-            allowed = self.within_bounds(last, level)
+            allowed = self.within_bounds(last, mark, level)
             made, last = self.changes(one) if allowed else None, one
             if made is None:
                 break
@@ -278,17 +278,31 @@ class _PlanExecution:
         remembers = self.problem.domain.remembers
         return {(situation, key): value for situation, key, value in changes if situation not in remembers}
 
-    def within_bounds(self, step: Step, level: int | None = None) -> bool:
+    def within_bounds(self, step: Step, mark: int, level: int | None = None) -> bool:
         """Return whether a step keeps all totals within their bounds and violates no constraint; if not, record the violation.
+
+        The changes of the step are in the log since the log had the length `mark`.
 
         If a level is given, only the totals and constraints that the level sees count.
 
         The initial state may have exceptions to a constraint. A step violates the constraint if the number of exceptions grows.
         """
+        if self.rules.lookups is not None:
+            self.note_totals(mark)
         found = violation(self.rules, self.facts, self.exceptions, level)
         if found is not None:
             self.fault(step.path, f"{step}: {found}")
         return found is None
+
+    def note_totals(self, mark: int) -> None:
+        """Look up the totals with bounds that depend on the changes since a mark of the log, as they are before and afterwards."""
+        facts, end, before = self.facts, len(self.facts.log), self.facts.since(mark)
+        changes = {cell: {old, facts.value(*cell) or FALSE} for cell, old in before.items()}
+        self.rules.bounded_totals.note(facts, changes)
+        for cell, old in before.items():
+            facts.put(*cell, old)
+        self.rules.bounded_totals.note(facts, changes)
+        facts.undo(end)
 
 
 def exceptions_of(problem: Problem, facts: LoggedState) -> dict[str, Fraction]:
@@ -436,6 +450,11 @@ class BehaviorReader:
         self.bounded = [
             name for name in self.totals if problem.domain.situations[name].quantity not in (None, Quantity())
         ]
+
+    @cached_property
+    def bounded_totals(self) -> BoundedTotals:
+        """The totals with bounds, by the changes on which they depend."""
+        return BoundedTotals(self, self.bounded)
 
     def follows(self, situation: str, arguments: Arguments, facts: LoggedState) -> bool:
         """Return whether some rule of a situation type derives the situation with the given arguments."""

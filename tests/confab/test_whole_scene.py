@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import pytest
 from hypothesis import event, given, settings
@@ -14,12 +15,14 @@ from confab.checking import refused
 from confab.planner.plan import Plan, Status, Step
 from confab.planner.solve import Mode
 from confab.planner.validation import Fault, carried_out, successor, validate
-from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.graph.knowledge import KnowledgeError, load
 from confab.reasoner.language import DomainError
 from confab.reasoner.reading import relevance
 from confab.reasoner.reading.problem import read
 from confab.reasoner.reading.rows import Triple
+from confab.reasoner.reading.surroundings import Surroundings
 from confab.reasoner.symbols import Problem, State
+from tests.reasoner.test_recognition_of_totals import SUM, yard
 from tests.reasoner.worlds import graph_of, worlds
 
 CASES = Path(__file__).parent / "cases"
@@ -168,3 +171,57 @@ def test_a_goal_without_a_definition_is_refused_by_name(mode: Mode, tmp_path: Pa
     (tmp_path / "lamps.ttl").write_text(text.replace("c:goal :task.g .", "c:goal :task.g, :task.h ."), encoding="utf-8")
     with pytest.raises(KnowledgeError, match=r"task\.h"):
         confab.load(tmp_path / "lamps.ttl").plan(mode=mode)
+
+
+EMPTIES = """:TOTAL c:mostAmount 1.0 . :train2 a owl:NamedIndividual, :Train ; :pulls :cart2, :cart10 .
+:TOTAL.rule a owl:NamedIndividual, c:Rule ; c:construct \"\"\"CONSTRUCT { ?train :total ?n } WHERE {
+  SELECT ?train (COUNT(?cart) AS ?n) WHERE { ?train a :Train ; :pulls ?cart . ?cart a :Cart
+    FILTER NOT EXISTS { ?crate a :Crate ; :in ?cart } } GROUP BY ?train }\"\"\" .
+"""
+LONG = """:TOTAL.rule a owl:NamedIndividual, c:Rule ; c:construct \"\"\"CONSTRUCT { ?train :total ?n } WHERE {
+  SELECT ?train (SUM(?load) AS ?n) WHERE { ?train a :Train ; :pulls ?cart . ?cart a :Cart ; :load ?load } GROUP BY ?train }\"\"\" .
+:Train c:hasSituationType :LONG . :LONG a owl:Class, owl:NamedIndividual, c:SituationType ; c:never true .
+:LONG.rule a owl:NamedIndividual, c:Rule ; c:construct \"\"\"CONSTRUCT { ?train :LONG true }
+  WHERE { ?train a :Train ; :total ?n FILTER(?n > 1) }\"\"\" .
+"""
+FURTHER = "".join(
+    f":cart{i}0 a owl:NamedIndividual, :Cart . :train{i}0 a owl:NamedIndividual, :Train ; :pulls :cart{i}0 .\n"
+    for i in range(1, 9)
+)
+
+
+@pytest.mark.parametrize(
+    ("more", "step", "trains"),
+    [
+        (SUM, ("crate1", "cart1"), 1),
+        (SUM.replace("SUM(?load)", "SUM(2 * ?load)").replace("1.0", "3.0"), ("crate1", "cart1"), 1),
+        (EMPTIES, ("crate2", "cart1"), 2),
+        (LONG, ("crate1", "cart1"), 9),
+    ],
+)
+def test_bounds_and_constraints_hold_for_the_totals_of_individuals_that_recognition_does_not_read(
+    more: str, step: tuple[str, str], trains: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    graph, close = load(yard(tmp_path, more, FURTHER)), relevance._RouteSearch.close
+
+    def closed(search: relevance._RouteSearch, *rest: Any) -> None:
+        close(search, *rest)
+        search.seen -= {one for one in search.seen if "train" in one}
+
+    with monkeypatch.context() as patch:
+        patch.setattr(relevance._RouteSearch, "close", closed)
+        part = relevance.recognise(graph)
+    plan = Plan((Step((0,), part.problem.id_of("PUT", step), 1, "PUT", step),))
+    read_by_check = set[str]()
+    problem = Surroundings.problem
+
+    def read_problem(around: Surroundings) -> Problem:
+        found = problem(around)
+        read_by_check.update(found.individuals)
+        return found
+
+    monkeypatch.setattr(Surroundings, "problem", read_problem)
+    assert not [fault for fault in carried_out(part.problem, plan) if fault.path]
+    assert refused(graph, part, plan) == carried_out(read(graph).problem, plan)
+    assert [fault for fault in refused(graph, part, plan) if fault.path]
+    assert len([one for one in read_by_check if "train" in one]) == trains
