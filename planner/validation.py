@@ -265,6 +265,11 @@ class _PlanExecution:
         if behavior is None or not self.rules.fits(behavior, step.arguments):
             self.fault(step.path, f"{step}: no such behaviour, or its parameters don't take these arguments")
             return None
+        if step.level != behavior.level:
+            self.fault(
+                step.path, f"{step}: the step is of level {step.level}, but its behaviour of level {behavior.level}"
+            )
+            return None
         changes = self.rules.changes(behavior, step.arguments, self.facts)
         if changes is None:
             beyond = self.rules.beyond(behavior, step.arguments, self.facts)

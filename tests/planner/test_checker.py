@@ -5,6 +5,7 @@ from fractions import Fraction
 
 import pytest
 
+from confab.planner.grounded.best_first import plan_level
 from confab.planner.plan import Plan, Step
 from confab.planner.validation import BehaviorReader, LoggedState, stretches, successor, validate
 from confab.reasoner.amounts import Amount, Quantity
@@ -23,6 +24,7 @@ from confab.reasoner.symbols import (
     ValueCondition,
     Witness,
 )
+from tests.planner.naive import tabletop
 from worlds.writing import becomes, behavior, has, lacks, world
 
 
@@ -254,3 +256,11 @@ def test_a_step_changes_amounts_and_values_and_its_price_is_calculated() -> None
     assert rules.price(pour, ("cup2",), facts) == 3
     assert rules.price(pour, ("cup1",), facts) is None
     assert rules.price(replace(pour, name="FREE", price=None), ("cup2",), facts) is None
+
+
+def test_a_step_has_the_level_of_its_behaviour() -> None:
+    problem = tabletop()
+    outcome = plan_level(problem, 3)
+    assert outcome.plan is not None
+    raised = Plan(tuple(replace(step, level=1) for step in outcome.plan.steps))
+    assert "the step is of level 1, but its behaviour of level 3" in validate(problem, raised)[0].text
