@@ -264,8 +264,11 @@ def searched_without(
 
 def none_at_all(problem: Problem, deadline: Deadline) -> bool:
     """Return whether the task can be proved unsolvable in half of the remaining time."""
+    from confab.planner.certificate_checks import refusal
+
     limits = Limits(seconds=None if deadline.left is None else deadline.left / 2)
-    return solve(Request(problem, limits=limits)).status is Status.UNSOLVABLE
+    certificate = solve(Request(problem.only(problem.weights), limits=limits)).certificate
+    return certificate is not None and refusal(problem, certificate) is None
 
 
 # ------------------------------------------------------------------------------------------------------------- searching

@@ -13,7 +13,7 @@ A plan of several levels is a sequence of behaviours of the lowest level that en
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import product
 from typing import Generic, TypeAlias, TypeVar
@@ -47,12 +47,12 @@ The changed entries are None if the behaviour isn't applicable.
 def refusal(problem: Problem, certificate: Certificate, most: float = WORK) -> str | None:
     """Return the reason why a certificate doesn't prove that a problem has no plan, or None if it is a proof.
 
-    If overlapping steps may reach more goals, the behaviours are the begins and the ends of steps.
+    If overlapping steps may reach more goals, the behaviours are the begins and the ends of steps. A plan may leave soft goals.
     """
     events = by_events(problem)
     if events is None:
         return "steps that overlap may reach more goals, and their begins and ends can't be examined separately"
-    problem = events
+    problem = with_hard_goals(events)
     try:
         for symbol in (*certificate.told_apart, *certificate.always, *(fact.symbol for fact in certificate.never)):
             if symbol.situation not in problem.domain.situations:
@@ -481,11 +481,26 @@ class Cases:
         return symbol not in self.problem.goal and reading.goal(symbol, self.lowest.initial(symbol))
 
 
+def with_hard_goals(problem: Problem) -> Problem:
+    """Return the problem without its soft goals; `weights` contains those that release their symbols from the rest value."""
+    if not problem.weights:
+        return problem
+    goal = {symbol: value for symbol, value in problem.goal.items() if symbol not in problem.weights}
+    rests = {symbol: problem.domain.situations[symbol.situation].rest for symbol in problem.weights}
+    released = {symbol: w for symbol, w in problem.weights.items() if problem.goal.get(symbol) != rests[symbol]}
+    return replace(problem, goal=goal, weights=released)
+
+
 def wanted_in_the_end(problem: Problem, fact: Fact) -> bool:
-    """Return whether a fact is a goal, or a rest value that a plan must restore after changing the symbol."""
+    """Return whether a fact is a goal, or a rest value that a plan must restore after changing the symbol.
+
+    The soft goals of the problem are those that `with_hard_goals` returns.
+    """
     symbol = fact.symbol
     if symbol in problem.goal:
         return problem.goal[symbol] == fact.value
+    if symbol in problem.weights:
+        return False
     kind = problem.domain.situations[symbol.situation]
     return kind.rest == fact.value and problem.first_level(symbol) <= problem.domain.levels[-1]
 

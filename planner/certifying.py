@@ -38,6 +38,7 @@ from confab.planner.certificate_checks import (
     Try,
     is_bounded,
     wanted_in_the_end,
+    with_hard_goals,
 )
 from confab.planner.certificates import Certificate
 from confab.planner.checked_conditions import own_variables, unified, variables
@@ -73,6 +74,7 @@ def certify(problem: Problem, most: float = WORK, few_states: bool = False) -> C
     """
     if not problem.domain.levels:
         return None
+    problem = with_hard_goals(problem)
     lowest = Lowest(problem, most)
     try:
         relaxed = Relaxed(lowest)

@@ -55,6 +55,7 @@ class Request:
     Attributes
     ----------
     problem : Problem
+        A plan meets all goals; soft goals count as hard. `confab.planner.preferences.preferred` chooses among soft goals.
     mode : str
         A key of `MODES`.
     limits : Limits
@@ -92,6 +93,8 @@ def solve(request: Request) -> Outcome:
     """
     if request.mode not in MODES:
         raise ValueError(f"unknown mode '{request.mode}'; wanted one of {', '.join(MODES)}")
+    if request.problem.weights:
+        request = replace(request, problem=replace(request.problem, weights={}))
     deadline, overlaps = Deadline.after(request.limits.seconds), may_overlap_by_need(request.problem)
     try:
         with within(deadline):

@@ -105,3 +105,13 @@ w:DAMP.rule a owl:NamedIndividual, :Rule ; :construct "CONSTRUCT { ?x w:DAMP tru
 """
     with pytest.raises(KnowledgeError, match=r"DAMP is derived, and has a c:restValue.*its rules read"):
         scene(tmp_path, DYED, WETTED, DRIED, derived).plan()
+
+
+@MODES
+def test_a_behaviour_that_can_be_in_no_plan_is_no_error_if_a_plan_may_leave_the_goal(
+    tmp_path: Path, options: dict[str, object]
+) -> None:
+    weight = "w:task.g :weight 3.0 .\n"
+    found = scene(tmp_path, DIPPED, weight).plan(**options)  # type: ignore[arg-type]
+    assert found.outcome.status is Status.SOLVED
+    assert found.plan.steps == ()

@@ -21,6 +21,7 @@ from confab.planner.certified import certified
 from confab.planner.certifying import WORK, _with_fewer, by_states, certify
 from confab.planner.plan import Limits, Outcome, Reason, Status
 from confab.planner.possibilities import Lowest
+from confab.planner.preferences import preferred
 from confab.planner.solve import MODES, Mode, Request, solve
 from confab.reasoner.amounts import Quantity
 from confab.reasoner.generate import write_scene
@@ -381,3 +382,40 @@ def test_a_certificate_that_was_found_in_time_is_kept_if_no_time_is_left_to_remo
     monkeypatch.setattr("confab.planner.possibilities.LOOKS", 1)
     assert _with_fewer(lowest, certificate) == certificate
     assert refusal(problem, certificate) is None
+
+
+def switching(goal: str | None, rest: str = FALSE) -> Problem:
+    """Return a task to warm a lamp, which lights the lamp for good, with a soft goal for its light."""
+    light = SituationType("LIT", ("Lamp",), "Truth", boolean=True, rest=rest)
+    warm = SituationType("WARM", ("Lamp",), "Truth", boolean=True)
+    on = behavior("ON", 1, "?l:Lamp", [], [becomes("LIT", "?l", TRUE), becomes("WARM", "?l", TRUE)])
+    soft = {} if goal is None else {"LIT a": goal}
+    problem = world([light, warm], [on], {"Lamp": ("a",)}, {"LIT a": FALSE}, {"WARM a": TRUE, **soft})
+    return replace(problem, weights=dict.fromkeys((Symbol("LIT", ("a",)),) if soft else (), Fraction(3)))
+
+
+def test_no_certificate_depends_on_a_goal_that_a_plan_may_leave() -> None:
+    lit = SituationType("LIT", ("Lamp",), "Truth", boolean=True)
+    on = behavior("ON", 1, "", [], [becomes("LIT", "a", TRUE)])
+    hard = world([lit], [on], {"Lamp": ("a", "b")}, {}, {"LIT a": TRUE, "LIT b": TRUE})
+    soft = replace(hard, weights={Symbol("LIT", ("b",)): Fraction(3)})
+    certificate = certify(hard)
+    assert certificate is not None
+    assert refusal(hard, certificate) is None
+    assert refusal(soft, certificate) == "b LIT true isn't wanted in this task"
+    assert certify(soft) is None
+    outcome = solve(Request(soft))  # counts soft goals as hard
+    assert outcome.certificate is not None
+    assert refusal(hard, outcome.certificate) is None
+
+
+def test_a_symbol_with_a_soft_goal_has_its_rest_value_in_the_end_only_if_the_soft_goal_is_this_value() -> None:
+    certificate = certify(switching(None))
+    assert certificate is not None
+    assert Fact(Symbol("LIT", ("a",)), FALSE) in certificate.unmet
+    for goal, proved in ((None, True), (FALSE, True), (TRUE, False)):
+        problem = switching(goal)
+        assert (refusal(problem, certificate) is None) == proved
+        assert (certify(problem) is not None) == proved
+        _, outcome = preferred(problem, lambda task: solve(Request(task)))
+        assert outcome.status is (Status.UNSOLVABLE if proved else Status.SOLVED)
