@@ -18,7 +18,7 @@ from random import Random
 from typing import Any
 
 from confab.reasoner.aggregates.dependencies import read_by
-from confab.reasoner.amounts import Amount, Quantity, bounds, written
+from confab.reasoner.amounts import Amount, Expression, Quantity, bounds, written
 from confab.reasoner.closure import closure
 from confab.reasoner.derivation import TASK, circular
 from confab.reasoner.symbols import (
@@ -32,6 +32,7 @@ from confab.reasoner.symbols import (
     Condition,
     Constraint,
     Domain,
+    EqualityCondition,
     Parameter,
     Problem,
     RelationCondition,
@@ -99,21 +100,25 @@ def drawn(
     priced: float = 0.0,
     everyone: float = 0.0,
     repeated: float = 0.0,
+    nested: float = 0.0,
 ) -> tuple[RandomWorld, Interpreter]:
     """Return the random world of a seed, and an interpreter of the world.
 
     Parameters
     ----------
     seed : int
-    aggregated, constrained, remembered, mutual, priced, everyone, repeated : float
+    aggregated, constrained, remembered, mutual, priced, everyone, repeated, nested : float
         The shares of worlds with derived amounts, with constraints on every state, with remembered situation types, with two
         situation types that define each other, with behaviours whose costs depend on amounts, with a goal about all individuals
-        of a class, and with behaviours that change a situation type by several effects.
+        of a class, with behaviours that change a situation type by several effects, and with bounds or constraints on totals of
+        totals.
     """
     rng = Random(f"mixed {seed}")
     most, least = (MOST, FEW if rng.random() < 0.5 else 2) if rng.random() > UNBOUNDED else (MOST // 10, 0)
     while True:
-        world = _Draft(rng, seed, aggregated, constrained, remembered, mutual, priced, repeated=repeated).world()
+        world = _Draft(
+            rng, seed, aggregated, constrained, remembered, mutual, priced, repeated=repeated, nested=nested
+        ).world()
         interpreter = Interpreter(world.problem)
         try:
             costs = interpreter.explored(world.problem.domain.levels[-1], most, False).costs
@@ -306,10 +311,11 @@ class _Draft(Vocabulary):
         priced: float,
         crowd: int = 0,
         repeated: float = 0.0,
+        nested: float = 0.0,
     ) -> None:
         super().__init__(rng)
         self.repeated = Random(f"repeated {seed}").random() < repeated
-        self.crowd, self.valued = crowd, priced
+        self.crowd, self.valued, self.nested = crowd, priced, nested
         self.seed, self.share, self.prevented = seed, aggregated, constrained
         self.remembered, self.connected = remembered, mutual
         self.forbidden: list[str] = []  # situation types of which a constraint is drawn
@@ -353,7 +359,7 @@ class _Draft(Vocabulary):
         problem = Problem("w", domain, self.classes, self.relations, self.initial, {}, self.parents, self.values)
         if aggregates:
             problem = self.bounded(problem)
-        problem = self.constrained(problem)
+        problem = self.totalled(self.constrained(problem))
         updates = frozenset(b.name for b in behaviors if self.chance(0.5)) if self.chance(UPDATES) else frozenset()
         return RandomWorld(self.seed, problem, self.parents, self.owners, frozenset(self.pairs), self.axioms, updates)
 
@@ -618,6 +624,85 @@ class _Draft(Vocabulary):
             chosen = [own.choice(derived if derived and own.random() < 0.8 else found)]
         constraints = {f"{one.situation}.exceptions": one for one in chosen}
         return replace(problem, domain=replace(problem.domain, constraints=constraints))
+
+    def totalled(self, problem: Problem) -> Problem:
+        """Return the problem; in a share of the worlds, it gets a total of totals, and limits on a total that hold initially."""
+        own, rng = Random(f"totals {self.seed}"), self.rng
+        if own.random() >= self.nested:
+            return problem
+        self.rng = own  # a separate generator keeps worlds without totals of totals unchanged
+        counts = [one.situation for one in self.aggregates.values() if one.kept and len(one.parameters) == 1]
+        if not counts or self.chance(0.3):
+            counts = self.total("S7", None)
+        totals = [*counts, *(self.total("S8", own.choice(counts)) if counts else ())]
+        if "S8" in totals and self.chance(0.2):
+            totals += self.total("S9", "S8")
+        self.rng = rng
+        if not totals:
+            return problem
+        domain = replace(problem.domain, situations=self.situations, aggregates=self.aggregates, rules=self.rules)
+        meant = Interpreter(replace(problem, domain=domain, classes=self.classes))
+
+        def initially(name: str) -> list[Fraction]:
+            return [Fraction(meant.initial[i]) for symbol, i in meant.slots.items() if symbol.situation == name]
+
+        constraints = {**domain.constraints}
+        last = totals[-1]
+        if (numbers := initially(last)) and own.random() < 0.7:
+            most = max(numbers) + own.choice((0, 0, 1)) if own.random() < 0.8 else None
+            least = min(numbers) if most is None or own.random() < 0.2 else None
+            if all(one is None or one.denominator in (1, 2, 4) for one in (most, least)):
+                self.situations[last] = replace(self.situations[last], quantity=Quantity("", False, least, most))
+        limited = own.choice(totals)
+        kind = self.situations[limited].arguments[0]
+        if (numbers := initially(limited)) and "|" not in kind and own.random() < 0.5:
+            sign, limit = own.choice(((">", max(numbers)), (">", max(numbers) + 1), ("<", min(numbers))))
+            if _sayable(limit):
+                condition = Comparison(Amount(limited, ("?p0",)), sign, limit)
+                self.rules["D7"] = (Rule("D7", (Parameter("?p0", kind),), (), (condition,)),)
+                self.owners["D7"], level = (kind,), self.situations[limited].level
+                self.situations["D7"] = SituationType("D7", (kind,), "Truth", level, boolean=True, default=FALSE)
+                constraints["D7.exceptions"] = Constraint("D7")
+        return replace(problem, classes=self.classes, domain=replace(domain, constraints=constraints))
+
+    def total(self, name: str, of: str | None) -> list[str]:
+        """Draw a count, or a sum or count over the owners of another total; return its name, or nothing if no total was found."""
+        whole = [*self.classes["A"], *self.classes["B"]]
+        kind = "A|B" if whole and of is not None and self.chance(0.2) else self.rng.choice(("A", "A", "B", "A1"))
+        for _ in range(TRIES):
+            writer = Phrases(self, HIGHEST)
+            owner = self.rng.choice(whole) if kind == "A|B" else writer.fresh(kind)
+            head = (Parameter("?argument0", kind),) if kind == "A|B" else writer.terms()
+            over = writer.fresh(self.rng.choice(("A", "A", "B")) if of is None else self.situations[of].arguments[0])
+            if "|" in writer.kinds[over]:
+                return []
+            near = [ends for ends in ((over, owner), (owner, over)) if "near" in self.ends]
+            if near and self.chance(0.4):
+                conditions: list[Condition] = [RelationCondition("near", self.rng.choice(near))]
+            else:
+                conditions = [self.joining(writer, over, owner)] if of is None or self.chance(0.8) else []
+            conditions += writer.conditions([over], 1, 1) if of is None and self.chance(0.4) else []
+            amount: Expression = Fraction(1)
+            if of is not None and self.chance(0.7):
+                amount = Amount(of, (over,))
+            elif of is not None:
+                conditions.append(Comparison(Amount(of, (over,)), self.rng.choice((">", ">=", "=")), Fraction(1)))
+            function = "count" if amount == 1 else "sum"
+            variables = tuple(one for one in writer.terms() if one not in head)
+            if kind == "A|B":
+                conditions.insert(0, EqualityCondition(head[0].name, owner))
+            made = Aggregate(name, function, amount, head, variables, tuple(conditions))
+            if not _recursive(made, self.rules):
+                break
+        else:
+            return []
+        if kind == "A|B":
+            self.classes[kind] = tuple(dict.fromkeys(whole))
+        self.owners[name] = tuple(kind.split("|"))
+        level = max((self.situations[s].level for s in read_by(made)), default=1)
+        self.situations[name] = SituationType(name, (kind,), name, level, quantity=Quantity())
+        self.aggregates[name] = made
+        return [name]
 
     def remembering(self) -> None:
         """Draw remembered situation types, and constraints on them: "at most once" and "only after"."""

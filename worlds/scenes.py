@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from random import Random
 
@@ -173,8 +174,12 @@ class _Scene:
     def aggregate(self, one: Aggregate) -> Iterator[str]:
         name = f"{one.situation}.total"
         self.begin(name, [p.name for p in (*one.parameters, *one.variables)])
+        owners = [p.name for p in one.parameters]
+        if "|" in one.parameters[0].kind and isinstance(one.conditions[0], EqualityCondition):
+            owners = [one.conditions[0].right]  # the rule of a total of several classes names one individual
+            one = replace(one, parameters=(), conditions=one.conditions[1:])
         conditions = [self.condition(condition) for condition in one.conditions]
-        said = [f"c:situationType :{one.situation}", *self.arguments([p.name for p in one.parameters])]
+        said = [f"c:situationType :{one.situation}", *self.arguments(owners)]
         said += [f'c:aggregate "{one.function}"', f"c:over {', '.join(self.terms[v.name] for v in one.variables)}"]
         said += [self.side("right", one.amount)] if one.function != "count" else []
         said += [f"c:condition {', '.join(conditions)}"] if conditions else []

@@ -10,6 +10,7 @@ import pytest
 
 from confab.planner.plan import Plan, Status, Step
 from confab.planner.validation import BehaviorReader
+from confab.reasoner.aggregates.dependencies import read_by
 from confab.reasoner.derivation import strata
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import LimitError
@@ -145,6 +146,19 @@ def test_the_part_that_recognition_selects_has_the_same_costs_and_names_as_the_w
     for seed in range(8_400_000, 8_400_006):
         world, meant = drawn(seed, constrained=0.3)
         assert not Judge(world, tmp_path, only="recognition", meant=meant).judged().complaints, seed
+
+
+@pytest.mark.usefixtures("unlimited_judge")
+def test_totals_of_totals_have_the_same_bounds_in_the_part_and_in_the_whole_world(tmp_path: Path) -> None:
+    owners = set[str]()
+    for seed in (995_000_002, 995_000_009, 995_000_010):
+        world, meant = drawn(seed, nested=1.0)
+        totals = world.problem.domain.aggregates
+        outer = [one for one in totals.values() if read_by(one) & totals.keys()]
+        assert outer, seed
+        owners.update(parameter.kind for one in outer for parameter in one.parameters)
+        assert not Judge(world, tmp_path, only="recognition", meant=meant).judged().complaints, seed
+    assert "A|B" in owners
 
 
 def test_a_certificate_that_tells_a_sum_apart_is_refuted_only_by_states_with_the_same_sum(tmp_path: Path) -> None:
