@@ -335,8 +335,8 @@ class FactEvaluation:
                 found = self.expression(aggregate.amount, solution)
                 if found is not None:
                     certain = all(self.holds(one, solution, aggregate.kinds, must=True) for one in conditions)
-                    low += found.low if certain and not found.partial else min(found.low, 0)
-                    high += found.high if certain and not found.partial else max(found.high, 0)
+                    low = _sum(low, found.low if certain and not found.partial else min(found.low, 0))
+                    high = _sum(high, found.high if certain and not found.partial else max(found.high, 0))
             self._totals[key] = Range(low, high)
         return self._totals[key]
 
@@ -552,9 +552,9 @@ def calculated(sign: str, one: Range, other: Range) -> Range | None:
     """Return the range of the results of an arithmetic operation on two ranges, or None if there is no result."""
     partial = one.partial or other.partial
     if sign == "+":
-        return Range(one.low + other.low, one.high + other.high, partial)
+        return Range(_sum(one.low, other.low), _sum(one.high, other.high), partial)
     if sign == "-":
-        return Range(one.low - other.high, one.high - other.low, partial)
+        return Range(_sum(one.low, -other.high), _sum(one.high, -other.low), partial)
     if sign == "/":
         if other.low == other.high == 0:
             return None
@@ -562,11 +562,26 @@ def calculated(sign: str, one: Range, other: Range) -> Range | None:
             return ANYTHING
         ends = [_quotient(a, b) for a in (one.low, one.high) for b in (other.low, other.high)]
     else:
-        ends = [a * b if a and b else Fraction(0) for a in (one.low, one.high) for b in (other.low, other.high)]
+        ends = [_product(a, b) for a in (one.low, one.high) for b in (other.low, other.high)]
     return Range(min(ends), max(ends), partial)
 
 
+def _sum(a: Bound, b: Bound) -> Bound:
+    """Return a sum; an infinite bound absorbs a number, however great the number is."""
+    if isinstance(a, float):
+        return a
+    return b if isinstance(b, float) else a + b
+
+
+def _product(a: Bound, b: Bound) -> Bound:
+    if not a or not b:
+        return Fraction(0)
+    if isinstance(a, float) or isinstance(b, float):
+        return math.inf if (a > 0) is (b > 0) else -math.inf
+    return a * b
+
+
 def _quotient(a: Bound, b: Bound) -> Bound:
-    if math.isinf(b):
-        return Fraction(0) if not math.isinf(a) else math.copysign(math.inf, a) * math.copysign(1, b)
-    return a / b
+    if isinstance(a, float):
+        return a if b > 0 else -a
+    return Fraction(0) if isinstance(b, float) else a / b

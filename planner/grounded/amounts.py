@@ -60,14 +60,14 @@ class Linear:
 
     def bounds(self, quantities: Sequence[Quantity]) -> tuple[float | Exact, float | Exact]:
         """Return the minimum and the maximum of the expression within the bounds of its amounts."""
-        least: float | Exact = self.constant
-        most = least
+        low = high = self.constant
+        downward = upward = False
         for place, factor in self.terms:
             quantity = quantities[place]
-            low, high = (quantity.least, quantity.most) if factor > 0 else (quantity.most, quantity.least)
-            least += -inf if low is None else low * factor
-            most += inf if high is None else high * factor
-        return least, most
+            least, most = (quantity.least, quantity.most) if factor > 0 else (quantity.most, quantity.least)
+            low, downward = (low, True) if least is None else (low + least * factor, downward)
+            high, upward = (high, True) if most is None else (high + most * factor, upward)
+        return -inf if downward else low, inf if upward else high
 
     def plus(self, other: Linear, times: Exact = 1) -> Linear:
         """Return the sum of the expression and a multiple of another expression."""

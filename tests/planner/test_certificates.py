@@ -23,13 +23,14 @@ from confab.planner.plan import Limits, Outcome, Reason, Status
 from confab.planner.possibilities import Lowest
 from confab.planner.preferences import preferred
 from confab.planner.solve import MODES, Mode, Request, solve
-from confab.reasoner.amounts import Quantity
+from confab.reasoner.amounts import Amount, Calculation, Expression, Quantity
 from confab.reasoner.generate import write_scene
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AmountEffect,
     Behavior,
+    Comparison,
     EqualityCondition,
     Fact,
     Parameter,
@@ -419,3 +420,24 @@ def test_a_symbol_with_a_soft_goal_has_its_rest_value_in_the_end_only_if_the_sof
         assert (certify(problem) is not None) == proved
         _, outcome = preferred(problem, lambda task: solve(Request(task)))
         assert outcome.status is (Status.UNSOLVABLE if proved else Status.SOLVED)
+
+
+def test_a_number_beyond_all_floating_point_numbers_is_compared_with_amounts_without_bounds() -> None:
+    kinds = [SituationType(name, (), "", quantity=Quantity()) for name in ("OIL", "GAS")]
+    oil, gas = Amount("OIL", ()), Amount("GAS", ())
+    vast: Expression = Fraction(10) ** 60
+    for _ in range(5):
+        vast = Calculation("*", vast, Fraction(10) ** 60)
+    for left in (Calculation("*", vast, oil), Calculation("+", vast, oil), Calculation("/", oil, vast)):
+        asked = Comparison(left, ">", Calculation("-", gas, vast))
+        pour = behavior("POUR", 1, "", [asked], [becomes("ON", TRUE)])
+        changes = [
+            replace(behavior(name, 1, "", [], []), amounts=(AmountEffect(name[1:], (), "decrease", Fraction(1)),))
+            for name in ("-OIL", "-GAS")
+        ]
+        on = SituationType("ON", (), "Truth", boolean=True)
+        problem = world([*kinds, on], [pour, *changes], {}, {"OIL": "0", "GAS": "0"}, {"ON": TRUE})
+        goal = Fact(Symbol("ON", ()), TRUE)
+        assert certify(problem) is None
+        assert refusal(problem, Certificate(never=frozenset({goal}), unmet=(goal,))) is not None
+        assert solve(Request(problem, limits=Limits(seconds=5.0))).status is not Status.UNSOLVABLE
