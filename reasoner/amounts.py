@@ -50,6 +50,11 @@ class Quantity:
         least = -inf if self.least is None else simplified(self.least)
         return least, inf if self.most is None else simplified(self.most)
 
+    def including(self, amount: Fraction) -> Quantity:
+        """Return the quantity with bounds that include an amount: an initial amount beyond a bound stays until it is changed."""
+        least = None if self.least is None else min(self.least, amount)
+        return replace(self, least=least, most=None if self.most is None else max(self.most, amount))
+
     def allows(self, amount: Number) -> bool:
         """Return whether an amount is a number within the bounds, and a whole number if this is required."""
         if isinstance(amount, float):  # `NOTHING`

@@ -59,7 +59,7 @@ class Linear:
         return float(self.of(vector))
 
     def bounds(self, quantities: Sequence[Quantity]) -> tuple[float | Exact, float | Exact]:
-        """Return the minimum and the maximum of the expression within the bounds of its amounts."""
+        """Return the minimum and the maximum of the expression within the ranges of its amounts."""
         low = high = self.constant
         downward = upward = False
         for place, factor in self.terms:
@@ -115,6 +115,7 @@ class AmountTable:
         self.place = {s: i for i, s in enumerate(symbol for symbol in self.now if symbol.situation in changed)}
         self.first = tuple(self.now[symbol] for symbol in self.place)
         self.quantities = [quantity for s in self.place if (quantity := situations[s.situation].quantity) is not None]
+        self.ranges = [q.including(Fraction(first)) for q, first in zip(self.quantities, self.first, strict=True)]
         self.bits: dict[tuple[Linear, str], int] = {}
         self._measures: dict[str, Mapping[tuple[str, ...], Exact]] = {}
 
@@ -190,11 +191,11 @@ class AmountTable:
         return tuple(found)
 
     def _decided(self, difference: Linear, sign: str) -> bool | None:
-        """Return True if a comparison is always true within the bounds of its amounts, False if the comparison is never true.
+        """Return True if a comparison is always true within the ranges of its amounts, False if the comparison is never true.
 
         Return None if the comparison depends on the amounts.
         """
-        least, most = difference.bounds(self.quantities)
+        least, most = difference.bounds(self.ranges)
         if most < 0 or (most == 0 and sign == ">") or (sign == "=" and least > 0):
             return False
         if sign != "=" and (least > 0 or (least == 0 and sign == ">=")):

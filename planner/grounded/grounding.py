@@ -341,5 +341,5 @@ class _TaskBuilder:
                 assert found is not None  # the preconditions require a value
                 if found.terms:
                     prices[operator] = found
-                costs.append(max(float(found.bounds(self.reached.amounts.quantities)[0]), 0.0))
+                costs.append(max(float(found.bounds(self.reached.amounts.ranges)[0]), 0.0))
         return costs, prices

@@ -201,9 +201,13 @@ class _Sums:
         return least
 
     def left(self, place: int) -> Fraction | None:
-        """Return a lower bound on an amount in every goal state, or None if there is no bound."""
+        """Return a lower bound on an amount in every goal state, or None if there is no bound.
+
+        An amount that is below its minimum at first may stay there.
+        """
         wanted = self.asked(bits_of(self.task.goal), place)
-        found = (self.amounts.quantities[place].least, self.kept(place), wanted)
+        least = self.amounts.quantities[place].including(Fraction(self.vector[place])).least
+        found = (least, self.kept(place), wanted)
         floor = [limit for limit in found if limit is not None]
         return max(floor, default=None)
 

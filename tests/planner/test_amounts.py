@@ -317,3 +317,23 @@ def test_a_price_is_read_in_the_state_before_its_step_even_if_nothing_is_true_th
     assert isinstance(task, Task)
     plan = task.operators_of([(name, ("box",)) for name in ("UP", "DOWN", "PAY")])
     assert plan is not None and task.cost_of(plan) == 2.0
+
+
+@pytest.mark.parametrize("first", ["-2", "7"])
+@pytest.mark.parametrize("operation", ["increase", "decrease"])
+@pytest.mark.parametrize("sign", ["<", "<=", "=", ">=", ">", None])
+def test_an_amount_beyond_its_bounds_may_stay_there(first: str, operation: str, sign: str | None) -> None:
+    oil = SituationType("OIL", ("Cup",), "", quantity=Quantity(least=Fraction(0), most=Fraction(5)))
+    lit = SituationType("LIT", ("Cup",), "Truth", boolean=True)
+    change = AmountEffect("OIL", ("?c",), operation, Fraction(1))
+    for limit in (Fraction(first), Fraction(0), Fraction(5)):
+        asked = [] if sign is None else [Comparison(Amount("OIL", ("?c",)), sign, limit)]
+        for negated in (False, True):
+            burn = behavior(
+                "BURN", 1, "?c:Cup", [replace(one, negated=negated) for one in asked], [becomes("LIT", "?c", TRUE)]
+            )
+            pour = Behavior("POUR", 1, (CUP,), amounts=(change,))
+            problem = world([oil, lit], [pour, burn], {"Cup": ("c",)}, {"OIL c": first}, {"LIT c": TRUE})
+            wanted = Status.SOLVED if solvable(problem) else Status.UNSOLVABLE
+            assert plan_level(problem).status is wanted
+            assert solve(Request(problem)).status is wanted
