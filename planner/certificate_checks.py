@@ -499,7 +499,7 @@ def wanted_in_the_end(problem: Problem, fact: Fact) -> bool:
     symbol = fact.symbol
     if symbol in problem.goal:
         return problem.goal[symbol] == fact.value
-    if symbol in problem.weights:
+    if symbol in problem.weights or symbol.situation in problem.domain.rules:
         return False
     kind = problem.domain.situations[symbol.situation]
     return kind.rest == fact.value and problem.first_level(symbol) <= problem.domain.levels[-1]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 from heapq import heappop, heappush
-from itertools import count
+from itertools import count, product
 
 from confab.planner.levels import levels_left
 from confab.planner.plan import Outcome, Status
@@ -46,13 +46,21 @@ def cheapest(problem: Problem, successors: Successors = by_the_checker, most: in
     defined situations and compares amounts.
     """
     after = successors(problem)
-    rests = {
-        s: r for s in problem.initial if (r := problem.domain.situations[s.situation].rest) and s not in problem.goal
+    lowest = problem.domain.at_level(problem.domain.levels[-1])
+    kinds, changed = problem.domain.situations, frozenset[str]().union(*(b.changes for b in lowest))
+    of = {
+        n: (problem.classes.get(c, ()) for c in kinds[n].arguments)
+        for n in sorted(changed)
+        if kinds[n].boolean and kinds[n].rest
     }
+    unstated = (Symbol(name, arguments) for name, classes in of.items() for arguments in product(*classes))
+    every = dict.fromkeys((*problem.initial, *unstated))
+    rests = {s: r for s in every if (r := kinds[s.situation].rest) and s not in problem.goal}
 
     def restless(before: State, state: State, old: frozenset[Symbol]) -> frozenset[Symbol]:
         """Return the changed symbols that do not have their rest value."""
-        return frozenset(s for s, r in rests.items() if state[s] != r and (s in old or state[s] != before[s]))
+        now = ((s, r, state.get(s, FALSE), before.get(s, FALSE)) for s, r in rests.items())
+        return frozenset(s for s, r, value, earlier in now if value != r and (s in old or value != earlier))
 
     def reached(state: State) -> bool:
         facts = LoggedState(problem, state)

@@ -35,6 +35,7 @@ from confab.reasoner.symbols import (
     Fact,
     Parameter,
     Problem,
+    Rule,
     SituationType,
     Symbol,
     spread,
@@ -441,3 +442,30 @@ def test_a_number_beyond_all_floating_point_numbers_is_compared_with_amounts_wit
         assert certify(problem) is None
         assert refusal(problem, Certificate(never=frozenset({goal}), unmet=(goal,))) is not None
         assert solve(Request(problem, limits=Limits(seconds=5.0))).status is not Status.UNSOLVABLE
+
+
+def test_no_plan_has_to_give_a_derived_situation_its_rest_value() -> None:
+    lit = SituationType("LIT", ("Lamp",), "Truth", boolean=True)
+    warm = SituationType("WARM", ("Lamp",), "Truth", boolean=True, rest=FALSE)
+    on = behavior("ON", 1, "?l:Lamp", [], [becomes("LIT", "?l", TRUE)])
+    problem = world([lit, warm], [on], {"Lamp": ("a",)}, {}, {"LIT a": TRUE})
+    rule = Rule("WARM", (Parameter("?l", "Lamp"),), (), (has("LIT", "?l", TRUE),))
+    problem = replace(problem, domain=replace(problem.domain, rules={"WARM": (rule,)}))
+    light, warmth = Symbol("LIT", ("a",)), Symbol("WARM", ("a",))
+    certificate = Certificate(told_apart={light: ()}, cases=2, unmet=(Fact(light, TRUE), Fact(warmth, FALSE)))
+    assert refusal(problem, certificate) == "a WARM false isn't wanted in this task"
+
+
+@pytest.mark.parametrize("stated", [{}, {"B c": FALSE}])
+def test_the_exhaustive_search_and_the_certificate_agree_on_rest_values_that_arent_stated(
+    stated: dict[str, str],
+) -> None:
+    kinds = [
+        SituationType(name, ("Cup",), "Truth", boolean=True, rest=rest) for name, rest in (("A", None), ("B", FALSE))
+    ]
+    both = behavior("BOTH", 1, "?c:Cup", [], [becomes("A", "?c", TRUE), becomes("B", "?c", TRUE)])
+    back = behavior("BACK", 1, "?c:Cup", [], [becomes("B", "?c", FALSE)])
+    for behaviors in ([both], [both, back]):
+        problem = world(kinds, behaviors, {"Cup": ("c",)}, stated, {"A c": TRUE})
+        assert solvable(problem) is (back in behaviors)
+        assert (certify(problem) is None) is (back in behaviors)
