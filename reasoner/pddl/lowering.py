@@ -72,7 +72,7 @@ CASES = 4
 MOST_CASES = 64
 """Maximum number of actions into which a behaviour is split by the individuals that several effects on amounts may concern."""
 APART = (
-    "the effects may concern the same individual, and PDDL can't limit their sum; state by inequality conditions which individuals "
+    "the effects may concern the same individual, and PDDL can't combine them; state by inequality conditions which individuals "
     "are different to export the behaviour"
 )
 
@@ -238,15 +238,18 @@ class Lowering:
         yield from every
 
     def added(self, behavior: Behavior) -> Iterator[Behavior]:
-        """Yield behaviours, each of which states for each two effects on bounded amounts whether both change the same amount.
+        """Yield behaviours, each of which states for each two effects on amounts whether both change the same amount.
 
-        The bounds limit the sum of the changes of an amount, so the terms of these changes must be equal.
+        If bounds limit the sum of the changes, or an effect assigns or multiplies, the terms of these changes must be equal. Other
+        effects are added up by every planner.
         """
         outer = [*map(named, behavior.preconditions), {p.name for p in behavior.parameters}]
         bound = set[str]().union(*outer)
         for one, other in combinations(behavior.amounts, 2):
             quantity = self.words.situations[one.situation].quantity
-            if one.situation != other.situation or one.situation in self.totals or not (quantity and quantity.bounded):
+            added = {one.operation, other.operation} <= {"increase", "decrease"}
+            summed = one.situation in self.totals or not (quantity and quantity.bounded)
+            if one.situation != other.situation or (added and summed):
                 continue
             differ = [pair for pair in zip(one.arguments, other.arguments, strict=True) if pair[0] != pair[1]]
             if any(self.distinct(behavior, *pair) for pair in differ):

@@ -24,6 +24,7 @@ from confab.reasoner.symbols import (
     TRUE,
     AmountEffect,
     Behavior,
+    Comparison,
     Domain,
     EqualityCondition,
     Parameter,
@@ -171,6 +172,40 @@ SWAP = Behavior(
 def test_an_exported_behaviour_keeps_its_meaning(behaviors: list[Behavior], cost: float) -> None:
     problem = problem_of(*behaviors)
     assert least(problem) == least(round_trip(problem)) == cost
+
+
+INCREASED = AmountEffect("LOAD", ("?y",), "increase", Fraction(2))
+ALWAYS, HEAVY = EqualityCondition("?x", "?x"), Comparison(Amount("LOAD", ("?x",)), ">=", Fraction(1))
+
+
+@pytest.mark.parametrize(
+    ("amounts", "load"),
+    [
+        ((AmountEffect("LOAD", ("?x",), "assign", Fraction(0)), INCREASED), 2),
+        ((INCREASED, AmountEffect("LOAD", ("?x",), "assign", Fraction(0))), 2),  # assignments come first
+        ((AmountEffect("LOAD", ("?x",), "assign", Fraction(5)), replace(INCREASED, operation="decrease")), 3),
+        ((AmountEffect("LOAD", ("?x",), "scale", Fraction(3)), INCREASED), 5),
+        ((AmountEffect("LOAD", ("?x",), "assign", Fraction(0), (HEAVY,)), INCREASED), 2),
+        ((AmountEffect("LOAD", ("?x",), "assign", Fraction(0), (ALWAYS,)), replace(INCREASED, arguments=("?x",))), 2),
+        ((AmountEffect("LOAD", ("?x",), "assign", Fraction(0), (HEAVY,)), replace(INCREASED, arguments=("?x",))), 2),
+        ((AmountEffect("LOAD", ("?x",), "increase", Fraction(1)), INCREASED), 4),
+    ],
+)
+def test_effects_that_may_change_one_amount_are_one_effect_of_an_exported_action(
+    amounts: tuple[AmountEffect, ...], load: int
+) -> None:
+    io = pytest.importorskip("unified_planning.io")
+    engines = pytest.importorskip("unified_planning.engines.sequential_simulator")
+    problem = problem_of(Behavior("POUR", 1, (THING, OTHER), (), (), (), amounts=amounts))
+    exported = to_pddl(replace(problem, goal={Symbol("LOAD", ("a",)): str(load)}))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # warnings of pyparsing
+        task = io.PDDLReader().parse_problem_string(exported.domain, exported.problem)
+        with engines.UPSequentialSimulator(task) as simulator:
+            first = simulator.get_initial_state()
+            (one,) = [found for found in simulator.get_applicable_actions(first) if {*map(str, found[1])} == {"a"}]
+            after = simulator.apply(first, *one)
+    assert {str(symbol): after.get_value(symbol).constant_value() for symbol in task.initial_values}["load(a)"] == load
 
 
 def test_an_exported_amount_has_a_value_for_each_object_that_its_function_accepts() -> None:
