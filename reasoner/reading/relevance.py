@@ -29,7 +29,7 @@ from confab.reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGrap
 from confab.reasoner.language import situations_of, terms
 from confab.reasoner.limits import check, checked
 from confab.reasoner.names import local_name
-from confab.reasoner.reading.frame import Frame, frame
+from confab.reasoner.reading.frame import Frame, frame, names_of
 from confab.reasoner.reading.goals import BOUNDS, with_goals
 from confab.reasoner.reading.individuals import (
     FACT,
@@ -459,15 +459,14 @@ class _RouteSearch(Individuals):
 
 
 def _namesakes(graph: KnowledgeGraph, schema: OntologySchema, members: Sequence[Member]) -> set[str]:
-    """Return the IRIs that differ only in the namespace from an individual or class that has been read.
+    """Return the IRIs that differ only in the namespace from an individual, a class or a term that has been read.
 
     Only known namespaces are searched.
 
     The candidates are looked up by their whole IRIs. An individual is included only if a class of the individual is stated. A class
     is included only if it has individuals besides the nodes that describe behaviours.
     """
-    classes = {*schema.supers, *chain.from_iterable(schema.supers.values())}
-    terms = ({iri for individual, kind, _ in members for iri in (individual, kind)} | classes) - schema.nodes.keys()
+    terms = {*names_of(schema, members).iris}
     endings = {local_name(iri) for iri in terms}
     check(RECOGNISING)
     candidates = {space + ending for space in _spaces(graph, schema, terms) for ending in endings} - terms

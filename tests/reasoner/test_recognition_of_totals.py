@@ -7,6 +7,7 @@ import pytest
 import confab
 from confab.planner.plan import Status
 from confab.reasoner.graph.knowledge import KnowledgeError, load
+from confab.reasoner.reading.problem import read
 from confab.reasoner.reading.relevance import recognise
 
 YARD = """@prefix : <https://example.org/yard#> .
@@ -106,6 +107,13 @@ def test_a_goal_names_its_situation_type_by_a_longer_name(tmp_path: Path) -> Non
     part = recognise(load(scene), ["crate1 yard:IN cart1"])
     assert {"PUT", "TAKE"} <= {one.name for one in part.problem.domain.behaviors.values()}
     assert confab.load(scene).plan("crate1 yard:IN cart1", optimal=True).outcome.bound == 1.0
+
+
+def test_a_behaviour_has_the_same_name_in_a_part_of_the_scene_as_in_the_whole_scene(tmp_path: Path) -> None:
+    graph = load(yard(tmp_path, SUM, "o:PUT a owl:NamedIndividual, :Bin .\n"))
+    part, whole = recognise(graph).problem, read(graph).problem
+    assert "PUT" not in part.individuals | whole.domain.behaviors.keys()
+    assert part.domain.behaviors.keys() == whole.domain.behaviors.keys()
 
 
 @pytest.mark.parametrize("word", ["cart1#", "cart%zz", "cart<1", "7"])
