@@ -14,7 +14,7 @@ action                          behaviour on level 1, all of whose variables are
 cost that depends on objects    one behaviour per cost
 function that never changes     static relation, whose last argument is the number
 any other function              situation type whose values are amounts, unless it only counts cost
-goal that isn't a fact          boolean situation type ``GOAL_REACHED`` with a rule
+(soft) goal that isn't a fact   boolean situation type ``GOAL_REACHED`` with a rule
 ==============================  ================================================================
 
 Invariant synthesis finds mutually exclusive predicates. At most one of several mutually exclusive predicates holds for an object
@@ -226,6 +226,8 @@ class _Import:
         events, all_happened, times = happenings(self, _Variables(self), situations, classes)
         behaviors |= {event.name: event for event in events}
         goal |= all_happened
+        if not goal:  # a task needs a goal
+            goal[self.defined("goal reached", (), situations)] = TRUE
         rules = self.rules()
         if any(s.arguments == (WORLD,) for s in situations.values()):
             classes[WORLD] = (THE_WORLD,)
@@ -337,33 +339,33 @@ class _Import:
         found: dict[Symbol, str] = {}
         parts = [one for part in conjuncts(self.pddl.goal) for one in spread(part, self.pddl.of_type, self.holds)]
         left = [one for one in parts if not self.plain(one, situations, found)]
-        if left or not (parts or self.pddl.preferences or self.pddl.timed):  # a task needs a goal
-            name = self.name("situation", "goal reached", "GOAL_REACHED")
-            situations[name] = SituationType(name, (WORLD,), "Truth", default=FALSE, boolean=True)
-            self.places["goal reached"] = PredicateTranslation(name)
-            self.axioms.append(Axiom("goal reached", (), Form((PddlWord("and", 0, 0), *left), 0, 0)))
-            found[Symbol(name, (THE_WORLD,))] = TRUE
+        if left:
+            found[self.defined("goal reached", left, situations)] = TRUE
         return found
 
-    def preferences(self, situations: Mapping[str, SituationType], goal: dict[Symbol, str]) -> dict[Symbol, Fraction]:
+    def defined(self, name: str, conditions: Sequence[Form], situations: dict[str, SituationType]) -> Symbol:
+        """Add a situation type with a rule for the conjunction of some conditions; return its only symbol."""
+        its = self.name("situation", name, re.sub(r"\W", "_", name.upper()))
+        situations[its] = SituationType(its, (WORLD,), "Truth", default=FALSE, boolean=True)
+        self.places[name] = PredicateTranslation(its)
+        self.axioms.append(Axiom(name, (), Form((PddlWord("and", 0, 0), *conditions), 0, 0)))
+        return Symbol(its, (THE_WORLD,))
+
+    def preferences(self, situations: dict[str, SituationType], goal: dict[Symbol, str]) -> dict[Symbol, Fraction]:
         """Add the soft goals to the goal, and return their weights in the metric. A soft goal without a weight is omitted.
 
-        Raises
-        ------
-        PddlError
-            A soft goal isn't equivalent to a single fact, or another goal has the same symbol.
+        A soft goal that isn't a fact, or whose symbol has another goal, becomes a situation type with a rule.
         """
         found: dict[Symbol, Fraction] = {}
         for name, form in self.pddl.preferences.items():
-            weight, fact = self.weights.get(f"is-violated {name}", Fraction(0)), dict[Symbol, str]()
+            weight, fact = self.weights.get(f"is-violated {name}"), dict[Symbol, str]()
+            if weight is None:
+                continue
             parts = list(conjuncts(form))
-            if len(parts) != 1 or not self.plain(parts[0], situations, fact) or len(fact) != 1:
-                raise PddlError(f"preference '{name}': only preferences of one fact are supported")
-            if fact.keys() & goal.keys():
-                raise PddlError(f"preference '{name}': {next(iter(fact))} has another goal")
-            if weight > 0:
-                goal |= fact
-                found |= dict.fromkeys(fact, weight)
+            if len(parts) != 1 or not self.plain(parts[0], situations, fact) or fact.keys() & goal.keys():
+                fact = {self.defined(f"preference {name}", parts, situations): TRUE}
+            goal |= fact
+            found |= dict.fromkeys(fact, weight)
         return found
 
     def holds(self, atom: Atom) -> bool | None:

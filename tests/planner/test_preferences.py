@@ -24,9 +24,6 @@ from confab.planner.solve import Request, solve
 from confab.planner.validation import unmet_goals, validate
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import OutOfTimeError
-from confab.reasoner.pddl.importing import imported
-from confab.reasoner.pddl.syntax import parse
-from confab.reasoner.pddl.words import PddlError
 from confab.reasoner.symbols import TRUE, Problem, SituationType, Symbol
 from worlds.interpreter import Interpreter
 from worlds.mixed import mixed
@@ -348,13 +345,6 @@ def test_soft_goals_are_preferences_of_pddl_both_ways(tmp_path: Path) -> None:
     assert CliRunner().invoke(app, ["import", *files, "-o", back]).exit_code == 0
     results = [confab.load(one).plan(optimal=True) for one in ("wishes-small", back)]
     assert results[0].cost == results[1].cost == 23.0
-
-
-def test_a_preference_that_is_not_a_single_fact_is_refused_by_name() -> None:
-    domain = "(define (domain d) (:predicates (p ?x) (q ?x)) (:action a :parameters (?x) :effect (and (p ?x) (q ?x))))"
-    problem = "(define (problem x) (:domain d) (:objects o) (:init) (:goal (preference both (and (p o) (q o)))))"
-    with pytest.raises(PddlError, match="preference 'both': only preferences of one fact"):
-        imported(parse(domain, problem))
 
 
 def test_a_brief_call_with_a_time_limit_leaves_the_first_plan_as_it_is() -> None:

@@ -47,6 +47,29 @@ def test_a_soft_goal_is_not_a_fact_before_the_plan(goal: str, steps: list[str], 
     assert cheapest(domain, f"{init} (:goal {goal}) {SOFT}", tmp_path) == steps
 
 
+@pytest.mark.parametrize(
+    ("hard", "x", "y", "steps"),
+    [
+        ("", "(and (g) (h))", "(not (on o))", ["both"]),
+        ("", "(or (g) (h))", "(not (g))", ["make"]),
+        ("", "(g)", "(not (g))", ["make"]),
+        ("(not (g))", "(g)", "(on o)", []),
+        ("", "(forall (?o) (on ?o))", "(h)", []),
+        ("", "(exists (?o) (on ?o))", "(on o)", ["put o"]),
+    ],
+)
+def test_a_soft_goal_may_be_any_condition(hard: str, x: str, y: str, steps: list[str], tmp_path: Path) -> None:
+    domain = f"""(:predicates (g) (h) (on ?x)) {COSTS} {MAKE}
+     (:action both :parameters () :effect (and (g) (h) (increase (total-cost) 4)))
+     (:action put :parameters (?x) :effect (and (on ?x) (increase (total-cost) 3)))"""
+    metric = "(:metric minimize (+ (total-cost) (is-violated y) (* 5 (is-violated x))))"
+    goal = f"(:goal (and {hard} (preference x {x}) (preference y {y})))"
+    problem = f"(:objects o p) (:init (= (f) 0) (= (total-cost) 0)) {goal}"
+    assert cheapest(domain, f"{problem} {metric}", tmp_path) == steps
+    if not hard:
+        assert cheapest(domain, f"{problem} (:metric minimize (total-cost))", tmp_path) == []
+
+
 def test_a_value_that_only_a_soft_goal_mentions_keeps_its_predicate(tmp_path: Path) -> None:
     domain = """(:predicates (at ?x ?y) (in ?x ?y) (place ?x) (truck ?x)) (:functions (total-cost))
      (:action load :parameters (?p ?t ?l) :precondition (and (truck ?t) (place ?l) (at ?p ?l) (at ?t ?l))
