@@ -293,7 +293,6 @@ def left_at_rest(problem: Problem, plan: Plan) -> bool:
 
     Such a search doesn't require that a symbol is at rest in the end if it isn't at rest initially.
     """
-    rests = {situation.name: situation.rest for situation in problem.domain.situations.values()}
-    return all(rests[s.situation] in (None, value) for s, value in problem.initial.items()) or not validate(
+    return all(situation.rest is None for situation in problem.domain.situations.values()) or not validate(
         problem, plan
     )

@@ -371,3 +371,21 @@ def test_a_plan_may_not_leave_a_moved_door_open_however_its_steps_are_grouped() 
         plan = Plan(renumbered(steps))
         assert "leaves it open" in str(validate(problem, plan)[0].text)
         assert any("left open" in one for one in faults(Interpreter(problem), plan))
+
+
+def test_a_boolean_whose_false_is_unstated_may_be_at_rest_when_true() -> None:
+    shut, lamp = (SituationType(name, ("Door",), "Truth", boolean=True) for name in ("SHUT", "LAMP"))
+    problem = world(
+        [replace(shut, rest=TRUE), lamp],
+        [
+            behavior("OPEN", 1, "", [has("SHUT", "door", TRUE)], [becomes("SHUT", "door", FALSE), becomes("LAMP", "door", TRUE)]),
+            behavior("CLOSE", 1, "", [has("SHUT", "door", FALSE)], [becomes("SHUT", "door", TRUE)]),
+        ],
+        {"Door": ("door",)},
+        {},
+        {"LAMP door": TRUE},
+    )  # fmt: skip
+    for mode in ("guarded", "optimal", "paper"):
+        outcome = solve(Request(problem, mode))
+        assert outcome.plan is not None
+        assert [step.behavior for step in outcome.plan.primitives] == ["CLOSE", "OPEN", "CLOSE"]
