@@ -87,12 +87,14 @@ def solve(request: Request) -> Outcome:
     Raises
     ------
     ValueError
-        The mode doesn't exist.
+        The mode doesn't exist, or the problem has no behaviours.
     RejectedPlanError
         The plan checker rejects the steps that a search found; this is an internal error.
     """
     if request.mode not in MODES:
         raise ValueError(f"unknown mode '{request.mode}'; wanted one of {', '.join(MODES)}")
+    if not request.problem.domain.behaviors:
+        raise ValueError("the problem has no behaviours, of which a plan could consist; import or write some")
     if request.problem.weights:
         request = replace(request, problem=replace(request.problem, weights={}))
     deadline, overlaps = Deadline.after(request.limits.seconds), may_overlap_by_need(request.problem)

@@ -389,3 +389,10 @@ def test_a_boolean_whose_false_is_unstated_may_be_at_rest_when_true() -> None:
         outcome = solve(Request(problem, mode))
         assert outcome.plan is not None
         assert [step.behavior for step in outcome.plan.primitives] == ["CLOSE", "OPEN", "CLOSE"]
+
+
+def test_a_problem_without_behaviours_is_refused_in_words() -> None:
+    lamp = SituationType("LAMP", ("Door",), "Truth", boolean=True)
+    problem = world([lamp], [], {"Door": ("door",)}, {}, {"LAMP door": TRUE})
+    with pytest.raises(ValueError, match="has no behaviours"):
+        solve(Request(problem))
