@@ -7,6 +7,11 @@ from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from types import CodeType
 
+from confab.reasoner.limits import check
+
+COMPILING = 4e-7
+"""Seconds of compilation per character of Python source; a compilation can't be interrupted."""
+
 
 def identifier(prefix: str, name: str) -> str:
     """Return an ASCII identifier for a term; distinct terms have distinct identifiers.
@@ -71,5 +76,6 @@ class GeneratorFunction:
 
 @lru_cache(maxsize=256)
 def code(source: str) -> CodeType:
-    """Return the compiled code of Python source."""
+    """Return the compiled code of Python source; raise `OutOfTimeError` if too little time is left for the compilation."""
+    check("compiling conditions", COMPILING * len(source))
     return compile(source, "<compiled behaviours>", "exec")

@@ -10,6 +10,7 @@ import pytest
 import confab
 from confab.planner.acting import executive
 from confab.planner.acting.symbolic_world import SymbolicWorld
+from confab.planner.generated import code
 from confab.planner.grounded.joins import JoinTable
 from confab.planner.hierarchical.unsolvability import impossible
 from confab.planner.plan import Limits, Outcome, Plan, Status
@@ -89,3 +90,10 @@ def test_a_chain_of_preconditions_may_be_longer_than_the_stack() -> None:
         {f"LIT {lamps[-1]}": TRUE}, {"after": pairwise(lamps)},
     )  # fmt: skip
     assert impossible(problem) is not None
+
+
+def test_a_compilation_that_would_pass_the_deadline_is_not_begun() -> None:
+    begin = perf_counter()
+    with within(0.1), pytest.raises(OutOfTimeError, match=r"gave up after 0\.1 s while compiling"):
+        code("x = 1\n" * 200_000)
+    assert perf_counter() - begin < 0.1
