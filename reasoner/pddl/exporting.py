@@ -28,6 +28,7 @@ from confab.reasoner.pddl.formulas import (
     change_text,
     conjuncts,
     decimal,
+    either,
     formula_text,
     inside,
     number_text,
@@ -37,7 +38,7 @@ from confab.reasoner.pddl.formulas import (
 )
 from confab.reasoner.pddl.lowering import ActionScope, LoweredAction, Lowering
 from confab.reasoner.pddl.vocabulary import PddlNames
-from confab.reasoner.symbols import Problem, State
+from confab.reasoner.symbols import Problem
 from confab.reasoner.timing import only_during
 
 LINE = "\n    "
@@ -57,9 +58,7 @@ class Exported:
     objects: Mapping[str, str]
 
 
-def to_pddl(
-    problem: Problem, level: int | None = None, initial: State | None = None, goal: State | None = None
-) -> Exported:
+def to_pddl(problem: Problem, level: int | None = None) -> Exported:
     """Return one level of a problem as a PDDL domain and a PDDL problem.
 
     Parameters
@@ -67,8 +66,6 @@ def to_pddl(
     problem : Problem
     level : int, optional
         The level whose behaviours become actions; by default the lowest level.
-    initial, goal : State, optional
-        Replacements for the problem's initial state and for its goal on the level.
 
     Raises
     ------
@@ -80,12 +77,7 @@ def to_pddl(
             f"{names[0]} gives a value only while it lasts, which classical PDDL can't say; such scenes are planned here only"
         )
     level = problem.domain.levels[-1] if level is None else level
-    found = replace(
-        problem,
-        initial=problem.initial if initial is None else initial,
-        goal=problem.goal_on(level) if goal is None else goal,
-    )
-    return _Export(found, level).exported()
+    return _Export(replace(problem, goal=problem.goal_on(level)), level).exported()
 
 
 def plan_of(exported: Exported, text: str) -> list[tuple[str, tuple[str, ...]]]:
@@ -137,6 +129,9 @@ class _Export:
             for symbol, weight in problem.weights.items()
             for soft in [self.lowering.goal(symbol, problem.goal[symbol])]
         ]
+        for symbol, rest in problem.at_rest(level).items():
+            if symbol in problem.weights:  # with the soft goal unmet, its symbol has to be at rest
+                wanted.append(either(self.lowering.goal(symbol, value) for value in (rest, problem.goal[symbol])))
         self.goal = both([*wanted, *self.lowering.within_bounds(ActionScope({}))])
         self.facts = [*self.lowering.kept.facts(), *self.words.facts()]
         self.formulas = [*(action.needs for action in self.actions.values()), *(holds for _, _, holds in self.derived)]

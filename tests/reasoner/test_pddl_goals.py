@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 
 import pytest
 
 import confab
-from confab.planner.plan import Status
+from confab.planner.plan import Limits, Status
+from confab.planner.plan_costs import cost_of
+from confab.planner.preferences import preferred
+from confab.planner.solve import Request, solve
+from confab.reasoner.pddl.exporting import to_pddl
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse
 from confab.reasoner.pddl.turtle import turtle
 from confab.reasoner.pddl.words import PddlError
+from confab.reasoner.symbols import TRUE, Problem, SituationType, Symbol
+from worlds.writing import becomes, behavior, has, lacks, world
 
 COSTS = "(:functions (total-cost) (f))"
 MAKE = "(:action make :parameters () :effect (and (g) (increase (f) 1) (increase (total-cost) 1)))"
@@ -176,3 +184,34 @@ def test_the_weight_of_a_soft_goal_is_its_part_of_the_metric(metric: str, steps:
     )
     unmake = "(:action unmake :parameters () :effect (not (h)))"
     assert cheapest(f"(:predicates (g) (h)) {COSTS} {MAKE} {unmake}", problem, tmp_path) == steps
+
+
+def total(problem: Problem) -> Fraction:
+    """Return the least sum of a plan's cost and the weights of the soft goals that the plan leaves unmet."""
+    limits = Limits(seconds=60.0)
+    task, outcome = preferred(
+        problem, lambda one: solve(Request(one, limits=limits)), lambda one: solve(Request(one, "optimal", limits))
+    )
+    assert outcome.plan is not None
+    assert outcome.proved
+    return Fraction(cost_of(task, outcome.plan)) + sum(one.weight for one in outcome.forgone)
+
+
+@pytest.mark.parametrize(
+    ("wish", "weight", "least"), [("north", 9, 7), ("north", 1, 6), ("home", 1, 5), ("east", 1, 3)]
+)
+def test_a_symbol_whose_exported_soft_goal_is_unmet_has_to_be_at_rest(wish: str, weight: int, least: int) -> None:
+    go = behavior("GO", 1, "?v:Van ?p:Place", [lacks("AT", "?v", "?p")], [becomes("AT", "?v", "?p")])
+    north = behavior("GO_NORTH", 1, "?v:Van", [], [becomes("AT", "?v", "north")])
+    look = behavior("LOOK", 1, "?v:Van ?p:Place", [has("AT", "?v", "?p")], [becomes("SEEN", "?p", TRUE)])
+    problem = world(
+        [SituationType("AT", ("Van",), "All", rest="home"), SituationType("SEEN", ("Place",), "Truth", boolean=True)],
+        [replace(go, cost=2.0), replace(north, cost=4.0), look],
+        {"Van": ("van",), "Place": ("home", "east"), "All": ("home", "east", "north")},
+        {"AT van": "home"},
+        {"SEEN east": TRUE, "AT van": wish},
+    )
+    problem = replace(problem, weights={Symbol("AT", ("van",)): Fraction(weight)})
+    exported = to_pddl(problem)
+    again = imported(parse(exported.domain, exported.problem)).problem
+    assert total(problem) == total(again) == least
