@@ -28,8 +28,8 @@ FORMS = (
 def parse_interventions(problem: Problem, texts: Iterable[str]) -> list[Intervention]:
     """Return the interventions that texts describe.
 
-    A text may also name a file with one intervention per line (``#`` begins a comment). An intervention may mention an individual
-    that an intervention before it adds.
+    A text may also name a file with one intervention per line (a ``#`` at the beginning of a line or after a space begins a
+    comment). An intervention may mention an individual that an intervention before it adds.
 
     Raises
     ------
@@ -44,7 +44,8 @@ def parse_interventions(problem: Problem, texts: Iterable[str]) -> list[Interven
             if not path.is_file():
                 raise KnowledgeError(f"'{text}' is no intervention and no file; wanted {FORMS}")
             try:
-                lines = [line.split("#")[0].strip() for line in path.read_text(encoding="utf-8").splitlines()]
+                content = path.read_text(encoding="utf-8")
+                lines = [re.split(r"(?:^|\s)#", line)[0].strip() for line in content.splitlines()]
             except UnicodeDecodeError as error:
                 raise KnowledgeError(f"{path}: not UTF-8 text ({error}); wanted one intervention per line") from error
         for line in filter(None, lines):

@@ -54,6 +54,18 @@ def test_interventions_come_from_a_file_too(tmp_path: Path) -> None:
     assert "1 change of plan" in done.stdout
 
 
+def test_a_file_of_interventions_may_name_steps_and_have_comments(tmp_path: Path) -> None:
+    file = tmp_path / "day.txt"
+    file.write_text(
+        "# the user\nafter=L3#28 cup2 LOCATION location8  # moves it\n\t# and takes it\nafter=3 remove cup2 #\n"
+    )
+    read = parse_interventions(confab.load("beverage-serving").problem, [str(file)])
+    assert [(one.after, one.text) for one in read] == [
+        ("L3#28", "after=L3#28 cup2 LOCATION location8"),
+        (3, "after=3 remove cup2"),
+    ]
+
+
 def test_interventions_whose_step_or_time_never_came_are_reported() -> None:
     never = ["after=999 remove cup2", "at=9999 remove cup2"]
     execution = confab.load("beverage-serving").execute(interventions=never)
