@@ -70,12 +70,17 @@ def tie(end: int) -> None:
         os._exit(1)
 
 
+def in_force(what: int, value: int) -> int:
+    """Return the limit of a resource that a child process can have: `value`, or the hard limit of this process if it is lower."""
+    hard = resource.getrlimit(what)[1]
+    return value if hard == resource.RLIM_INFINITY else min(value, hard)
+
+
 def limit_cpu(seconds: float) -> None:
     """Set the limit of CPU time of this process to `seconds` from now."""
     used = sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
-    hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
-    soft = int(used + min(seconds, MOST_SECONDS)) + 1
-    resource.setrlimit(resource.RLIMIT_CPU, (soft if hard == resource.RLIM_INFINITY else min(soft, hard), hard))
+    soft = in_force(resource.RLIMIT_CPU, int(used + min(seconds, MOST_SECONDS)) + 1)
+    resource.setrlimit(resource.RLIMIT_CPU, (soft, resource.getrlimit(resource.RLIMIT_CPU)[1]))
 
 
 def start(command: Sequence[str], seconds: float = CPU_SECONDS, **options: Any) -> Popen[bytes]:
@@ -181,7 +186,7 @@ def answer(megabytes: int) -> None:
     out = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # the output of the function becomes error output
     if megabytes:
-        resource.setrlimit(resource.RLIMIT_AS, (megabytes * 1_000_000,) * 2)
+        resource.setrlimit(resource.RLIMIT_AS, (in_force(resource.RLIMIT_AS, megabytes * 1_000_000),) * 2)
     function, arguments = pickle.load(sys.stdin.buffer)
     try:
         result = True, function(*arguments)
@@ -197,9 +202,8 @@ def main(end: int, seconds: int, command: list[str]) -> None:
     """Replace this process by a command that ends when the other end of a pipe is closed."""
     tie(end)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    hard = resource.getrlimit(resource.RLIMIT_CPU)[1]  # a limit that this process already has
-    most = seconds + 1 if hard == resource.RLIM_INFINITY else min(seconds + 1, hard)
-    resource.setrlimit(resource.RLIMIT_CPU, (min(seconds, most), most))
+    most = in_force(resource.RLIMIT_CPU, seconds + 1)
+    resource.setrlimit(resource.RLIMIT_CPU, (max(most - 1, 1), most))  # the signal at the lower limit tells the cause
     os.execvp(command[0], command)
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import logging
 import os
 import re
+import resource
 from codecs import BOM_UTF8
 from collections import Counter
 from functools import lru_cache
@@ -128,7 +129,7 @@ def safe(content: bytes, form: ox.RdfFormat, base: str) -> tuple[bytes, ox.RdfFo
 def _parsed_apart(content: bytes, media_type: str, base: str) -> bytes:
     from subprocess import TimeoutExpired
 
-    from confab.reasoner.workers import WorkerError, call
+    from confab.reasoner.workers import WorkerError, call, in_force
 
     left = current().left
     try:
@@ -138,8 +139,10 @@ def _parsed_apart(content: bytes, media_type: str, base: str) -> bytes:
         raise
     except WorkerError as error:
         log.debug("%s", error)
+        seconds = in_force(resource.RLIMIT_CPU, int(SECONDS))
+        megabytes = in_force(resource.RLIMIT_AS, MEGABYTES * 1_000_000) // 1_000_000
         raise DocumentError(
-            f"can't be read within {SECONDS:.0f} s and {MEGABYTES:,} MB; give it one context, or save it as Turtle"
+            f"can't be read within {seconds} s and {megabytes:,} MB; give it one context, or save it as Turtle"
         ) from error
     return parsed
 

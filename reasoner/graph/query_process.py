@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import pickle
 import re
+import resource
 import signal
 import sys
 from collections.abc import Sequence
@@ -28,7 +29,7 @@ from confab.reasoner.graph.knowledge import BASE, DERIVED, GRAPHS, KnowledgeErro
 from confab.reasoner.limits import LimitError, check, current
 from confab.reasoner.names import nearest
 from confab.reasoner.vocabulary import CORE
-from confab.reasoner.workers import end, kill, start
+from confab.reasoner.workers import MOST_SECONDS, end, in_force, kill, start
 
 if TYPE_CHECKING:
     from typing_extensions import Buffer
@@ -132,6 +133,8 @@ class QueryWorker:
 
     def __init__(self, graph: KnowledgeGraph, limits: QueryLimits, nice: int = 0) -> None:
         self.graph, self.limits, self.nice = graph, limits, nice
+        self._bytes = in_force(resource.RLIMIT_AS, limits.megabytes * 1_000_000)
+        self._cpu_seconds = in_force(resource.RLIMIT_CPU, int(min(limits.seconds, MOST_SECONDS)) + 3) - 1
         self._process: Popen[bytes] | None = None
         self._sending = Lock()
 
@@ -217,8 +220,8 @@ class QueryWorker:
         return {
             "prefixes": self.graph.spoken,
             "quads": _dumped(self.graph),
-            "seconds": self.limits.seconds,
-            "memory": self.limits.megabytes * 1_000_000,
+            "seconds": self._cpu_seconds,
+            "memory": self._bytes,
             "rows": self.limits.rows,
             "service": self.limits.service,
             "nice": self.nice,
@@ -234,13 +237,13 @@ class QueryWorker:
     def _why(self, status: int, said: str, late: bool) -> Exception:
         """Return the error for a query that ended without a result."""
         if late or status == -signal.SIGXCPU:
-            return LimitError(f"gave up after {self.limits.seconds:g} s at the query; ask for less, or give more time")
+            seconds = self.limits.seconds if late else self._cpu_seconds
+            return LimitError(f"gave up after {seconds:g} s at the query; ask for less, or give more time")
         if status == -signal.SIGKILL:
             return LimitError("the query was interrupted")
         if "memory" in said.lower():
-            return LimitError(
-                f"gave up: the query needs more than {self.limits.megabytes:,} MB of memory; ask for less"
-            )
+            megabytes = self._bytes // 1_000_000
+            return LimitError(f"gave up: the query needs more than {megabytes:,} MB of memory; ask for less")
         if status < 0:
             return KnowledgeError(f"the query brings the SPARQL engine down (signal {-status}); nest it less deeply")
         return RuntimeError(f"the process that answers queries failed: {said}")

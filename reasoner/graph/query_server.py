@@ -61,7 +61,7 @@ def forked(store: ox.Store, question: tuple[Any, ...], setup: dict[str, Any]) ->
             os.close(ours)
             for number in (0, 1, 2):
                 os.dup2(theirs, number)
-            limit(resource.RLIMIT_CPU, int(min(setup["seconds"], 1e9)) + 2)
+            limit(resource.RLIMIT_CPU, setup["seconds"], 1)  # the signal at the lower limit tells the cause
             if not setup["service"]:
                 limit(resource.RLIMIT_NOFILE, 3)  # no files besides standard streams
             query, default, named = question
@@ -90,9 +90,9 @@ def forked(store: ox.Store, question: tuple[Any, ...], setup: dict[str, Any]) ->
     return bytes(found) if status == 0 else pickle.dumps(("ended", status, found.decode("utf-8", "replace")))
 
 
-def limit(what: int, value: int) -> None:
-    """Set a resource limit of this process permanently."""
-    resource.setrlimit(what, (value, value))
+def limit(what: int, value: int, more: int = 0) -> None:
+    """Set a resource limit of this process permanently; `more` is the distance to the hard limit."""
+    resource.setrlimit(what, (value, value + more))
 
 
 def answer(

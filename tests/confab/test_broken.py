@@ -561,6 +561,27 @@ def test_a_harmful_query_is_ended_with_one_line_and_harms_nothing_else(
     assert said in err
 
 
+@pytest.mark.parametrize(
+    ("limit", "pattern", "code", "said"),
+    [
+        ("-t 20", "?s a k:Cup", YES, ""),
+        ("-v 1500000", "?s a k:Cup", YES, ""),
+        ("-t 3", "?s ?a ?b . ?c ?d ?e . ?f ?g ?h", GAVE_UP, "gave up after 2 s at the query"),
+        ("-v 1500000", "?s ?a ?b . ?c ?d ?e . ?f ?g ?h", GAVE_UP, "needs more than 1,536 MB of memory"),
+    ],
+)
+def test_a_query_keeps_the_limits_of_its_shell_and_the_message_states_them(
+    limit: str, pattern: str, code: int, said: str
+) -> None:
+    group = "?s ?a ?b ?c ?d ?e ?f ?g ?h" if limit.startswith("-v") else "?s"
+    query = f"SELECT (COUNT(?s) AS ?n) WHERE {{ {pattern} }} GROUP BY {group}"
+    run = f"ulimit {limit}; exec '{sys.executable}' -c 'from confab.start import main; main()' query beverage-serving '{query}'"
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    done = subprocess.run(["/bin/sh", "-c", run], capture_output=True, text=True, check=False, env=env)
+    assert (done.returncode, done.stderr.count("\n")) == (code, bool(said)), done.stderr
+    assert said in done.stderr
+
+
 def test_no_query_reaches_another_endpoint_unless_the_user_allows_it(tmp_path: Path) -> None:
     """A query that the check of keywords accepts still can't open a connection, unless the user allows it."""
     import http.server
