@@ -44,6 +44,8 @@ from confab.reasoner.updates.words import (
     UpdateOperation,
     constructed,
     parsed,
+    place,
+    words,
 )
 
 CHANGES = {"+": "increase", "-": "decrease", "*": "scale"}
@@ -78,7 +80,9 @@ class UpdateCompiler:
                 self.scope.bind(name, kind, "Parameter", node, update.place(0))
         first = operations[0]
         known = self.known | {name for name, (_, _, number) in self.scope.declared.items() if number}
-        group = self.scope.group(first.where, known)
+        later = [(one.delete, one.insert, one.where) for one in operations[1:]]
+        used = set(words([first.delete, first.insert, *later]))
+        group = self.scope.group(first.where, known, used)
         for name, kind in group.chosen.items():
             self.scope.bind(name, self.scope.iri(kind), "Parameter", "", update.place(kind.at))
         self.scope.determine(group)
@@ -86,7 +90,7 @@ class UpdateCompiler:
         self.nodes.links["precondition"] += self.conditions.all_of(group, within)
         self.effects(first, [], within, group)
         for operation in operations[1:]:
-            inner = self.scope.group(operation.where, within)
+            inner = self.scope.group(operation.where, within, set(words([operation.delete, operation.insert])))
             if lost := [
                 n for t in (*operation.delete, *operation.insert) for n in variables_in(t) if n in inner.chosen
             ]:
@@ -107,7 +111,7 @@ class UpdateCompiler:
         self.nodes.now, self.scope.prefixes = query, {**query.prefixes, **own}
         self.nodes.links = {}
         head, prop = rule.head, self.scope.iri(rule.head.predicate)
-        group = self.scope.group(rule.where, set())
+        group = self.scope.group(rule.where, set(), set(words(rule.argument)) if rule.function != "count" else ())
         named = [word for word in variables_in(head) if word != rule.name]
         if rule.function and {*named} != rule.grouped:
             (lost, *_) = sorted({*named} ^ rule.grouped)
@@ -116,7 +120,8 @@ class UpdateCompiler:
             if name in group.chosen:
                 kind = group.chosen.pop(name)
                 self.scope.bind(name, self.scope.iri(kind), "Variable", "", query.place(kind.at))
-        self.scope.determine(group)
+        if rule.function or not group.chosen:
+            self.scope.determine(group)
         within = {*self.scope.terms, *group.names}
         if rule.function:
             self.total(rule, group, within)
@@ -146,7 +151,17 @@ class UpdateCompiler:
             replace(rule.head, object=(*middle_of(rule.head), NumberLiteral(Fraction(0)))), within
         )
         self.nodes.said[self.nodes.behavior] = {**own.properties, "aggregate": [rule.function]}
-        if rule.argument is not None:
+        for part in group.parts:
+            if not isinstance(part, Triple) and part.name == "GroupOrUnionGraphPattern":
+                raise UpdateError(
+                    "an aggregate counts each alternative of UNION",
+                    "write FILTER(EXISTS { … } || EXISTS { … })",
+                    place(part),
+                )
+        if rule.function == "count":
+            if lost := sorted({*words(rule.argument)} - within):
+                raise UpdateError(f"nothing outside of braces determines {lost[0]}, which is counted", SELECT, at)
+        else:
             self.numbers.side(self.nodes.behavior, "right", self.numbers.expression(rule.argument, within, at), at)
 
     def effects(self, operation: UpdateOperation, when: Sequence[str], known: Collection[str], *asked: Group) -> None:

@@ -6,6 +6,8 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from rdflib.plugins.sparql.parserutils import CompValue
+
 from confab.reasoner.condition_nodes import (
     Properties,
     class_properties,
@@ -39,7 +41,7 @@ class Conditions:
         If the group introduces variables with a type, witnesses enclose the conditions.
         """
         if not group.chosen:
-            self.scope.determine(group)
+            self.scope.determine(group, nested=True)
             return self.all_of(group, {*known, *group.names})
         return [self.witness(group, known, at)]
 
@@ -63,10 +65,10 @@ class Conditions:
         made = []
         for name, word in group.chosen.items():
             node, kind = self.nodes.new("condition", "Witness", word.at), self.scope.iri(word)
-            self.scope.bind(name, kind, "Variable", "", self.nodes.now.place(word.at), sought=True)
+            self.scope.bind(name, kind, "Variable", "", self.nodes.now.place(word.at), "witness")
             self.nodes.said[node]["witness"] = [self.scope.terms[name]]
             made.append((node, name, kind))
-        self.scope.determine(group)
+        self.scope.determine(group, nested=True)
         for level, (node, sought, kind) in enumerate(made):
             found = self.all_of(Group(levels[level]), inside)
             found += [deeper for deeper, *_ in made[level + 1 : level + 2]]
@@ -111,11 +113,13 @@ class Conditions:
             return [node for each in (one.expr, *one.other) for node in self.filter(each, known)]
         if name == "ConditionalOrExpression":
             return [self.any_of([self.filter(each, known) for each in (one.expr, *one.other)], place(one))]
-        if name == "UnaryNot":
-            return [self.negated(self.filter(one.expr, known), False, place(one))]
-        if name == "Builtin_EXISTS":
-            return self.inside(one.graph, known)
-        if name == "Builtin_NOTEXISTS":
+        inner = unwrapped(one.expr) if name == "UnaryNot" else None
+        if name == "UnaryNot" and getattr(inner, "name", "") not in ("Builtin_EXISTS", "Builtin_NOTEXISTS"):
+            return [self.negated(self.filter(inner, known), False, place(one))]
+        one, name, opposite = (inner, inner.name, True) if inner is not None else (one, name, False)
+        if name in ("Builtin_EXISTS", "Builtin_NOTEXISTS"):
+            if (name == "Builtin_EXISTS") != opposite:
+                return self.inside(one.graph, known)
             group = self.scope.group(parts(one.graph), known)
             return [self.negated(self.sought(group, known, place(one)), bool(group.determined), place(one))]
         if (
@@ -145,8 +149,11 @@ class Conditions:
     def values(self, part: Any, known: Collection[str]) -> str:
         """Return the condition node of a VALUES clause, which states that the variables equal the values of some row."""
         at = place(part)
-        several = not isinstance(part.var[0], str) or len(part.var) > 1
-        rows = [tuple(row) if several else (row,) for row in part.value or ()]
+        rows = [(row,) if isinstance(row, str | CompValue) else tuple(row) for row in part.value or ()]
+        if any(len(row) != len(part.var) for row in rows):
+            raise UpdateError(
+                "a row of VALUES has not as many values as there are variables", "write a value or UNDEF for each", at
+            )
         groups = [
             [
                 self.equal(name, one, False, known)

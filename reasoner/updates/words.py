@@ -6,6 +6,7 @@ text and position. All other parts of the syntax tree are those that rdflib crea
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -120,6 +121,8 @@ def parsed(text: str) -> tuple[Mapping[str, str], list[UpdateOperation]]:
 
 
 CONSTRUCT = "write CONSTRUCT { ?x :property ?y } WHERE { … }"
+PATHS = ("PathAlternative", "PathSequence", "PathElt", "PathPrimary")
+"""The names of the parts of a path that may enclose a single property."""
 SELECT = "write SELECT ?x (SUM(?n) AS ?total) WHERE { … } GROUP BY ?x"
 AGGREGATE = re.compile("Aggregate_(Sum|Count|Max|Min)")
 
@@ -141,6 +144,12 @@ def constructed(text: str) -> tuple[Mapping[str, str], Construction]:
     prologue, tree = _tree("QueryUnit", text, "CONSTRUCT query", CONSTRUCT)
     if tree.name != "ConstructQuery" or tree.datasetClause or not tree.template:
         raise UpdateError("a rule has to be a CONSTRUCT query with a head", CONSTRUCT, 0)
+    if tree.groupby or tree.having or tree.orderby or tree.limitoffset or tree.valuesClause:
+        raise UpdateError(
+            "a rule has no GROUP BY, HAVING, ORDER BY, LIMIT or VALUES behind WHERE",
+            "put VALUES inside the braces of WHERE",
+            0,
+        )
     heads = [triple for block in tree.template for triple in triples(block)]
     if len(heads) != 1:
         raise UpdateError(
@@ -179,9 +188,8 @@ def _aggregated(head: Triple, select: Any) -> Construction:
             "put the conditions on variables that aren't counted into FILTER EXISTS { … }",
             computed[0].evar.at,
         )
-    argument = None if found[1] == "Count" else inner.vars
     return Construction(
-        head, parts(select.where), found[1].lower(), argument, str(computed[0].evar), frozenset(map(str, grouped))
+        head, parts(select.where), found[1].lower(), inner.vars, str(computed[0].evar), frozenset(map(str, grouped))
     )
 
 
@@ -349,6 +357,8 @@ def term(value: Any, at: int) -> Said:
     if isinstance(said, bool):
         return Truth(said)
     if isinstance(said, int | float | Decimal):
+        if not math.isfinite(said):
+            raise UpdateError("a number is too large", "write a smaller number", at)
         return NumberLiteral(Fraction(str(value)))
     text = value if type(value).__name__ == "Literal" else getattr(value, "string", None)
     if text is None:
@@ -363,13 +373,14 @@ def term(value: Any, at: int) -> Said:
 
 def _predicate(path: Any) -> Word:
     """Return the property of a property path, which must consist of a single property."""
+    at = place(path)
     while not isinstance(path, Word):
-        inner = path.part if isinstance(path.part, Word) else (path.part or [None])
-        if path.mod or path.name == "PathEltOrInverse" or (not isinstance(inner, Word) and len(inner) != 1):
-            raise UpdateError("a path isn't supported", "write a pattern for each step of it", place(path))
-        path = inner if isinstance(inner, Word) else inner[0]
-        if path is None:
-            raise UpdateError("a path isn't supported", "write a pattern for each step of it", 0)
+        inner = path.part if isinstance(path.part, Word | Mapping) else [*(path.part or ())]
+        if path.mod or path.name not in PATHS or (isinstance(inner, list) and len(inner) != 1):
+            raise UpdateError(
+                "a path isn't supported", "write a pattern for each step of it, and UNION for each choice", at
+            )
+        path = inner[0] if isinstance(inner, list) else inner
     return path
 
 

@@ -163,6 +163,11 @@ def faults(folder: Path, text: str) -> list[UpdateFault]:
         ("INSERT { ?t :fits ?s } WHERE { ?t a :Tube . ?s a :Slot }", "nothing changes", "property of a situation", (1, 13)),
         ("INSERT { ?t a :Tube } WHERE { ?t a :Tube }", "doesn't change", "property of a situation", (1, 13)),
         (HEAD + "} ; INSERT { ?t :spot ?slot } WHERE { ?t a :Tube }", "would denote all", "a parameter", (1, len(HEAD) + 14)),
+        (HEAD + ".\n ?tube !:fits ?slot }", "a path isn't supported", "UNION for each choice", (2, 9)),
+        (HEAD + ".\n ?tube (:fits|:spot) ?slot }", "a path isn't supported", "UNION for each choice", (2, 9)),
+        (HEAD + ".\n VALUES (?tube ?from) { (:a) } }", "not as many values", "UNDEF", (2, 10)),
+        (HEAD + ".\n ?slot :size ?n BIND(?n + 1 AS ?n) }", "a second value", "a new variable", (2, 32)),
+        (HEAD + ".\n { ?tube :spot ?x } UNION { ?x a :Slot } ?x :fits ?slot }", "outside of it", "another name", (2, 16)),
         ("CLEAR ALL", "deletes and inserts", "without WITH", (1, 1)),
     ],
 )  # fmt: skip
