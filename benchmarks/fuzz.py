@@ -270,7 +270,7 @@ def _check_plan(result: Result) -> None:
     ):
         unsolvable = outcome.status is Status.UNSOLVABLE
         assert not unsolvable or least == math.inf, "unsolvable was said of what a search of all states solves"
-        assert (outcome.bound or 0.0) <= least + 1e-6, (
+        assert (outcome.bound or 0.0) <= least + float(outcome.penalty or 0) + 1e-6, (
             f"{outcome.bound} was proved, and a search of all states finds {least}"
         )
     if outcome.status is Status.UNSOLVABLE:

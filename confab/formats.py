@@ -109,6 +109,7 @@ class OutcomeJson(TypedDict):
     length: NotRequired[dict[str, int]]
     steps: NotRequired[list[StepJson]]
     cost: NotRequired[float]
+    penalty: NotRequired[float]
     bound: NotRequired[float]
     engine: NotRequired[str]
     reason: NotRequired[ReasonJson]

@@ -35,8 +35,8 @@ OVERVIEW: Mapping[str, str] = {
     "result.why(step), result.why_not(WHAT), scene.behaviors[step.behavior].preconditions, "
     "scene.behaviors[step.behavior].effects, result.timed; to show: print(step), result.labels.step(step); to try: "
     "scene.verify(plan), scene.execute(plan); to save: json()",
-    "outcome": "to read: status, plan, reason, cost, bound, proved, forgone, unmet, saving, left; about the search: seconds, "
-    "search, engine, given_up, fallbacks, hits, misses, effort, certificate",
+    "outcome": "to read: status, plan, reason, cost, penalty, total, bound, proved, forgone, unmet, saving, left; about the "
+    "search: seconds, search, engine, given_up, fallbacks, hits, misses, effort, certificate",
     "reason": "to read: text, terms, states",
     "schedule": "to read: makespan, slots, intervals, lanes(), serial, work, plan; about optimality: bound, bounds, least, "
     "scheduler; also: arcs",

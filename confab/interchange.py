@@ -55,7 +55,9 @@ def outcome_json(scene: str, outcome: Outcome, seconds: Mapping[str, float]) -> 
         data["steps"] = [step_json(step) for step in outcome.plan.steps]
     if outcome.cost is not None:
         data["cost"] = outcome.cost
-    if outcome.bound is not None and outcome.bound >= 0:  # a negative bound is about other sets of soft goals
+    if outcome.plan is not None and outcome.penalty is not None:
+        data["penalty"] = float(outcome.penalty)
+    if outcome.bound is not None:
         data["bound"] = outcome.bound
     if outcome.engine is not None:
         data["engine"] = outcome.engine

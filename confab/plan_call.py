@@ -211,7 +211,8 @@ def in_time(task: PlanningTask, problem: Problem, outcome: Outcome) -> tuple[Out
             other = search(task, problem, how)
             if other.plan is not None and other.plan.primitives != outcome.plan.primitives:
                 longer, timed = scheduled(problem, other, task.deadline, shorten)
-                found = found if timed is None else replace(longer, bound=outcome.bound)
+                if timed is not None:
+                    found = replace(longer, bound=outcome.bound, penalty=outcome.penalty, forgone=outcome.forgone)
         if timed is not None and not shorten and mode != "paper" and task.deadline.left is not None:
             return shortened_in_time(task, problem, found, timed, how)
     return found, timed
@@ -224,7 +225,8 @@ def shortened_in_time(
     from confab.planner.timed.call import keeps_times
 
     priced = with_unit_costs(problem) if task.options.minimise == "steps" else problem
-    if schedule_of(found) is not None or (found.bound is not None and cost_of(priced, timed.plan) <= found.bound):
+    total = cost_of(priced, timed.plan) + float(found.penalty or 0)
+    if schedule_of(found) is not None or (found.bound is not None and total <= found.bound):
         return found, timed
     before = compared(priced, timed.plan.primitives)
     how = how._replace(share=SHORTENING, shortening="repeated", first=found, accepts=partial(keeps_times, problem))

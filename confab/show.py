@@ -127,11 +127,18 @@ def lengths(plan: Plan) -> str:
 
 
 def _proved(outcome: Outcome) -> str:
-    """Return a text with the cost of a plan (if behaviours have costs) and the proved bound on its length or cost."""
-    cost, bound = outcome.cost, outcome.bound
+    """Return a text with the cost of a plan (if behaviours have costs) and the proved bound on its length, cost or total cost."""
+    cost, bound, penalty = outcome.cost, outcome.bound, outcome.penalty
     said = "" if cost is None else f", costs {cost:g}"
     if bound is None:
         return said
+    if penalty is not None and outcome.plan is not None:
+        said = said or f", counts {len(outcome.plan.primitives)} for its primitives"
+        said += f" and {float(penalty):g} for unmet soft goals" if penalty else " with all soft goals met"
+        if outcome.proved:
+            return f"{said}, proved cheapest in total on the lowest level"
+        least = f": any plan costs at least {bound:g}, unmet soft goals included" if bound > 0 else ""
+        return f"{said}; not proved cheapest in total{least}"
     best = "shortest" if cost is None else "cheapest"
     if outcome.proved:
         return f"{said}, proved {best} on the lowest level"

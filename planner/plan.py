@@ -355,10 +355,11 @@ class Outcome:
     If `status` is solved, the outcome has a `plan`; otherwise the outcome has a `reason`. `search` contains the effort of all
     searches of each level. `fallbacks` counts how often a level had no refinement for the level above. `hits` counts refinements
     found in the cache, and `misses` counts refinements that required a search. `cost` is the cost of the plan if some behaviour has
-    a price. `bound` is a proved lower bound on the cost of every lowest-level plan for the same goals. `engine` names the external
-    planner that found the plan. `given_up` describes the levels that the planner gave up, each with its goal. `left` contains the
-    runs of consecutive lower-level steps in the plan, with the violated conditions of the level above. `saving` states how much
-    cost the shortening saved per second in the end; it is None if the plan wasn't shortened. `certificate` proves that the task is
+    a price. `penalty` is the sum of the weights of the unmet soft goals, or None if the task has no soft goals. `bound` is a proved
+    lower bound on the sum of cost and penalty of every lowest-level plan for the task. `engine` names the external planner that
+    found the plan. `given_up` describes the levels that the planner gave up, each with its goal. `left` contains the runs of
+    consecutive lower-level steps in the plan, with the violated conditions of the level above. `saving` states how much cost the
+    shortening saved per second in the end; it is None if the plan wasn't shortened. `certificate` proves that the task is
     unsolvable; every unsolvable outcome of `confab.planner.solve` has a certificate. `forgone` contains the unmet soft goals.
     `effort` is the work of finding the plan, in units of about a microsecond.
     """
@@ -371,6 +372,7 @@ class Outcome:
     seconds: float = 0.0
     bound: float | None = None
     cost: float | None = None
+    penalty: Fraction | None = None
     hits: int = 0
     misses: int = 0
     engine: str | None = None
@@ -382,11 +384,16 @@ class Outcome:
     effort: int = 0
 
     @property
+    def total(self) -> float:
+        """The sum of the plan's cost (without prices, the number of primitives) and the penalty; it is infinite without a plan."""
+        if self.plan is None:
+            return math.inf
+        return float(Fraction(len(self.plan.primitives) if self.cost is None else self.cost) + (self.penalty or 0))
+
+    @property
     def proved(self) -> bool:
-        """Whether `bound` proves that no plan is cheaper than `plan`."""
-        if self.plan is None or self.bound is None:
-            return False
-        return (len(self.plan.primitives) if self.cost is None else self.cost) <= self.bound
+        """Whether `bound` proves that no plan has a smaller total than `plan`."""
+        return self.plan is not None and self.bound is not None and self.total <= self.bound
 
     @property
     def unmet(self) -> frozenset[Symbol]:

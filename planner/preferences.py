@@ -61,8 +61,7 @@ def preferred(
     search, prove : callable
         Functions that plan for the goals of a problem. `prove` also proves a lower bound on the cost; with `prove`, all choices are
         tried that could be cheaper, at most `MOST_CHOICES`, and `bound` of the outcome is a lower bound on the total cost of any
-        choice, reduced by the weights of the unmet soft goals. It is negative if a choice with a smaller total cost than these
-        weights isn't excluded.
+        choice.
     shorten : callable, optional
         Function that shortens the plan of an outcome of `search`, if its last argument is true with little work.
     extend : callable, optional
@@ -325,8 +324,9 @@ class _SoftGoalChoices:
             known = [one for one in (extended, searched) if one is not None]
             price = min(known).limit_denominator(PRECISION) if known else None
             forgone.append(Forgone(fact, self.weights[symbol], price, wanted, self.why(chosen | {symbol})))
-        bound = None if least is None else float(min(least - self.unmet(kept), cost))
-        return self.task(kept), replace(outcome, forgone=tuple(forgone), bound=bound)
+        penalty = self.unmet(kept)
+        bound = None if least is None else float(min(least, cost + penalty))
+        return self.task(kept), replace(outcome, forgone=tuple(forgone), penalty=penalty, bound=bound)
 
     def met(self, found: Outcome) -> Goals:
         """Return the soft goals that the plan of an outcome meets."""

@@ -403,8 +403,8 @@ class Judge:
                 if wrong := faults(meant, outcome.plan):
                     self.complain("invalid plan", mode, wrong[0])
                 unmet_weights = float(sum(weights[symbol] for symbol in outcome.unmet))
-                least = min(totals, default=math.inf) - unmet_weights
-                self.bound(mode, outcome.bound, least, float(cost(meant, outcome.plan)))
+                own = float(cost(meant, outcome.plan)) + unmet_weights
+                self.bound(mode, outcome.bound, min(totals, default=math.inf), own)
 
     def certificate(self, mode: str, outcome: Outcome) -> None:
         """Compare a certificate of unsolvability with all reachable states."""

@@ -8,6 +8,7 @@ from fractions import Fraction
 from itertools import combinations
 from pathlib import Path
 from random import Random
+from typing import Literal
 
 import pytest
 from click.testing import CliRunner
@@ -15,7 +16,6 @@ from click.testing import CliRunner
 import confab
 import ontology
 from confab.cli import app
-from confab.interchange import outcome_json
 from confab.plan_call import CHOICE_WORK
 from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, Step
 from confab.planner.plan_costs import cost_of
@@ -25,6 +25,7 @@ from confab.planner.validation import unmet_goals, validate
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import OutOfTimeError
 from confab.reasoner.symbols import TRUE, Problem, SituationType, Symbol
+from confab.timing import with_unit_costs
 from worlds.interpreter import Interpreter
 from worlds.mixed import mixed
 from worlds.scenes import scene
@@ -318,8 +319,9 @@ def test_choices_of_random_tasks_cost_as_little_as_exhaustive_search_finds(tmp_p
         unmet = sum((one.weight for one in outcome.forgone), Fraction(0))
         cost = Fraction(cost_of(task, outcome.plan))
         assert cost + unmet == best, seed
+        assert (outcome.penalty, outcome.total) == (unmet, float(best)), seed
         assert outcome.bound is not None, seed
-        assert Fraction(outcome.bound) <= cost, seed
+        assert outcome.bound <= outcome.total, seed
     assert judged > 4
 
 
@@ -453,10 +455,28 @@ def test_a_soft_goal_is_met_if_steps_for_it_cost_less_than_its_weight_although_o
     assert not result.faults(result.plan)
 
 
-def test_a_bound_that_says_nothing_about_the_cost_isnt_in_json() -> None:
-    problem = confab.load("wishes-small").problem
-    outcome = replace(default(problem), bound=-8.0)
-    assert "bound" not in outcome_json("wishes-small", outcome, {})
+@pytest.mark.parametrize(
+    ("weight", "minimise", "expected"),
+    [
+        ("8.0", None, "costs 23 and 8 for unmet soft goals, proved cheapest in total on the lowest level"),
+        ("500.0", None, "costs 34 with all soft goals met, proved cheapest in total on the lowest level"),
+        ("8.0", "steps", "counts 7 for its primitives with all soft goals met, proved cheapest in total"),
+        ("0.5", "steps", "for its primitives and 0.5 for unmet soft goals, proved cheapest in total"),
+    ],
+)
+def test_the_bound_with_soft_goals_is_a_bound_on_the_cost_and_the_unmet_weights_together(
+    weight: str, minimise: Literal["steps"] | None, expected: str, tmp_path: Path
+) -> None:
+    read = confab.load(written(tmp_path, "c:weight 8.0", f"c:weight {weight}"))
+    result = read.plan(optimal=True, minimise=minimise)
+    data = result.json()
+    assert expected in str(result)
+    assert data["penalty"] == sum(one["weight"] for one in data.get("forgone", ()))
+    assert data["bound"] == data["penalty"] + (data["length"]["2"] if minimise else data["cost"])
+    problem = with_unit_costs(read.problem) if minimise else read.problem
+    alone = optimal(problem.only(problem.weights)).plan
+    assert alone is not None
+    assert cost_of(problem, alone) < data["bound"] <= cost_of(problem, alone) + sum(problem.weights.values())
 
 
 def test_a_plan_is_extended_by_steps_for_a_soft_goal_that_the_choices_left_unmet() -> None:
