@@ -102,3 +102,31 @@ def test_a_where_holds_for_the_same_individuals_as_in_sparql(tmp_path: Path, blo
             compared += 1
             assert both[0] == both[1], f"seed {seed}: {text}"
     assert compared > 12
+
+
+TOTAL = """
+:TOTAL a owl:NamedIndividual, c:SituationType, c:Amount ; c:valueProperty :total . :Town c:hasSituationType :TOTAL .
+:total a owl:DatatypeProperty, owl:FunctionalProperty, owl:NamedIndividual ; rdfs:domain :Town ; rdfs:range xsd:integer .
+:GO a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 1 ; c:update \"\"\"
+  INSERT { ?v :at ?to } WHERE { ?v a :Van . ?to a :Town ; :total ?t FILTER(?t > 0) }\"\"\" .
+:TOTAL.rule a owl:NamedIndividual, c:Rule ; c:construct \"\"\"CONSTRUCT { ?to :total ?sum } WHERE { SELECT }\"\"\" .
+"""
+
+
+@pytest.mark.parametrize("function", ["SUM(?q)", "SUM(?q + 1)", "COUNT(?v)", "COUNT(*)"])
+def test_a_sum_and_a_count_are_those_of_sparql(tmp_path: Path, function: str) -> None:
+    compared, file = 0, tmp_path / "w.ttl"
+    for seed in range(15):
+        text = where(Random(f"{function} {seed}"))
+        select = f"SELECT ?to ({function} AS ?sum) WHERE {{ {text} . ?v :n ?q }} GROUP BY ?to"
+        file.write_text(WORLD + TOTAL.replace("SELECT", select), encoding="utf-8")
+        rows = Graph().parse(file).query(f"PREFIX : <https://example.org/w#> {select}")
+        meant = {str(town).rpartition("#")[2]: int(total) for town, total in rows if town is not None}  # type: ignore[misc]
+        try:
+            initial = confab.load(file).problem.initial
+        except KnowledgeError:
+            continue
+        compared += 1
+        found = {cell.arguments[0]: int(value) for cell, value in initial.items() if cell.situation == "TOTAL"}
+        assert found == {town: meant.get(town, 0) for town in ("north", "mid", "south")}, text
+    assert compared > 5
