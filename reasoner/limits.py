@@ -55,7 +55,9 @@ class Deadline:
         In the message, `doing` describes the work in progress.
         """
         if perf_counter() + ahead > self.at:
-            raise OutOfTimeError(f"gave up after {round(self.seconds, 2) or self.seconds:g} s while {doing}; give more time")
+            raise OutOfTimeError(
+                f"gave up after {round(self.seconds, 2) or self.seconds:g} s while {doing}; give more time"
+            )
 
 
 _current: ContextVar[Deadline] = ContextVar("deadline", default=Deadline())  # noqa: B039 - frozen
