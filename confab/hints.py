@@ -26,7 +26,7 @@ OVERVIEW: Mapping[str, str] = {
     "soft_goals; to walk: plan.steps, plan.primitives, plan.length, plan.at_level(LEVEL); to ask: why(STEP), why_not(WHAT), "
     "explain(), labels, purposes, dearer(), certificate; to try: verify(), execute(); to show: print(result), report(FILE), "
     "plan.to_dot(); to save: save(FILE), json(), plan.to_dataframe(), plan.to_networkx(); to plan again: scene.plan(GOALS), "
-    "in_order(ID, …); also: plan, outcome, problem, scene, optimal, part, queries, faults, in_whole_scene",
+    "in_order(ID, …); also: plan, outcome, problem, scene, optimal, options, part, queries, faults, in_whole_scene",
     "plan": "to read: plan[NUMBER], steps, primitives, length, at_level(LEVEL), walk(), index(STEP); to ask: result.why(STEP), "
     "result.why_not(WHAT), result.cost, result.timed, result.labels; to try: scene.verify(plan), scene.execute(plan); to show: "
     "print(plan), to_dot(), result.report(FILE); to save: result.save(FILE), json(), to_records(), to_dataframe(), "

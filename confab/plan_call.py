@@ -28,7 +28,7 @@ from confab.checking import refused
 from confab.known import Known
 from confab.plan_options import NO_ENGINE, PlanOptions
 from confab.planner.certified import certified
-from confab.planner.plan import Limits, Outcome, Plan, Reason, Shortening, Status
+from confab.planner.plan import Forgone, Limits, Outcome, Plan, Reason, Shortening, Status
 from confab.planner.plan_costs import compared, cost_of
 from confab.planner.solve import DEFAULT_MODE, Request, solve, unchecked
 from confab.planner.timed.plan import schedule_of
@@ -39,7 +39,7 @@ from confab.reasoner.reading.goals import with_goals
 from confab.reasoner.reading.problem import Reading
 from confab.reasoner.reading.relevance import recognise
 from confab.reasoner.refining import never_done, without
-from confab.reasoner.symbols import Behavior, GroundBehavior, Problem
+from confab.reasoner.symbols import Behavior, Fact, GroundBehavior, Problem
 from confab.timing import (
     asks_for_times,
     needs_others_meanwhile,
@@ -93,6 +93,8 @@ class PlanningTask:
     grounds: Mapping[int, tuple[GroundBehavior, ...]] | None
     checking: float
     """The expected time of the check in the whole scene, in seconds: the check reads the part of the scene again."""
+    choosing: bool = True
+    """Whether the planner chooses among the soft goals; if not, it plans for the other goals alone."""
 
     def whole(self) -> Problem:
         """Return the problem with all individuals of the scene."""
@@ -281,6 +283,10 @@ def searched(task: PlanningTask, problem: Problem) -> tuple[Problem, Outcome]:
     mode = task.options.strategy
     if not problem.weights:
         return problem, search(task, problem, Searching(mode))
+    if not task.choosing:
+        hard = problem.only(problem.weights)
+        left = tuple(Forgone(Fact(one, problem.goal[one]), weight, None) for one, weight in problem.weights.items())
+        return hard, replace(search(task, hard, Searching(mode)), forgone=left)
     from confab.planner.preferences import preferred
 
     alike = with_unit_costs(problem) if task.options.minimise == "steps" else problem

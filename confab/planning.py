@@ -15,10 +15,10 @@ from confab.checking import refused
 from confab.formats import ResultJson
 from confab.interchange import outcome_json
 from confab.known import Known
-from confab.plan_call import planned, read_task
+from confab.plan_call import PlanningTask, Searching, own_request, planned, read_task
 from confab.plan_options import PlanOptions
 from confab.planner.plan import Outcome, Plan, SoftGoal, Status, Step, paused_collection, renumbered
-from confab.planner.solve import DEFAULT_MODE, Mode, Request, solve
+from confab.planner.solve import DEFAULT_MODE, Mode, solve
 from confab.planner.timed.plan import schedule_of
 from confab.planner.validation import Fault, unmet_goals, validate
 from confab.reasoner.graph.knowledge import KnowledgeError
@@ -30,7 +30,7 @@ from confab.reasoner.reading.goals import with_goals
 from confab.reasoner.reading.problem import Reading
 from confab.reasoner.symbols import Fact, Problem
 from confab.reasoner.timing import may_overlap_by_need
-from confab.timing import Minimise, lanes, needs_others_meanwhile, schedule_json
+from confab.timing import Minimise, lanes, needs_others_meanwhile, schedule_json, with_unit_costs
 
 if TYPE_CHECKING:
     from typing import Unpack
@@ -116,8 +116,8 @@ def plan(
     return plan_by(scene, facts, options)
 
 
-def plan_by(scene: Known, goals: list[str], options: PlanOptions) -> Result:
-    """Plan in a scene with validated options."""
+def plan_by(scene: Known, goals: list[str], options: PlanOptions, choosing: bool = True) -> Result:
+    """Plan in a scene with validated options; without `choosing`, only for the hard goals and `goals`."""
     scene.settle()
     scene.knowledge.require_whole()
     with within(options.limit) as deadline, paused_collection():
@@ -134,12 +134,13 @@ def plan_by(scene: Known, goals: list[str], options: PlanOptions) -> Result:
         task = read_task(scene, goals, memory, options, deadline)
         quantified = perf_counter() - begin
         check_goal(scene.iri, task.problem)
-        found = planned(task)
+        found = planned(replace(task, choosing=choosing))
         seconds = {**scene.seconds, "quantify": quantified}
         queries = scene.knowledge.round_trips - asked
         return Result(
-            scene, found.problem, found.outcome, seconds, queries, found.part, tuple(goals), found.timed, found.optimal
-        )
+            scene, found.problem, found.outcome, seconds, queries, found.part, tuple(goals), found.timed, found.optimal,
+            replace(options, memory=memory),
+        )  # fmt: skip
 
 
 def result_of(scene: Known, plan: Plan, goals: Facts = ()) -> Result:
@@ -190,7 +191,8 @@ class Result(metaclass=RightNames):
 
     `problem` has the individuals that the task can need. `queries` is the number of queries to the store. `part` is the part of
     the scene from which the problem was read; it is None for the whole scene. `goals` are the given goals, which replaced goals
-    of the task for the same symbols. `optimal` states whether the search looked for an optimal plan.
+    of the task for the same symbols. `optimal` states whether the search looked for an optimal plan. `options` are the options of
+    the call; alternatives are planned with the same options.
     """
 
     scene: Known = field(compare=False)
@@ -202,6 +204,7 @@ class Result(metaclass=RightNames):
     goals: tuple[str, ...] = ()
     timed: TimedPlan | None = None
     optimal: bool = False
+    options: PlanOptions = field(default=PlanOptions(), compare=False)
 
     def faults(self, plan: Plan) -> list[Fault]:
         """Return the faults that a plan for the same task has in the whole scene; the list is empty if the plan is valid."""
@@ -221,8 +224,8 @@ class Result(metaclass=RightNames):
     @property
     def soft_goals(self) -> tuple[SoftGoal, ...]:
         """The soft goals of the task, the heaviest first."""
-        task, unmet = with_goals((self.part or self.scene.reading).problem, self.goals), self.outcome.unmet
-        found = [SoftGoal(Fact(s, task.goal[s]), weight, s not in unmet) for s, weight in task.weights.items()]
+        task, met = with_goals((self.part or self.scene.reading).problem, self.goals), self.problem.goal
+        found = [SoftGoal(Fact(s, task.goal[s]), weight, s in met) for s, weight in task.weights.items()]
         return tuple(sorted(found, key=lambda one: (-one.weight, one.fact.symbol)))
 
     def __bool__(self) -> bool:
@@ -344,7 +347,8 @@ class Result(metaclass=RightNames):
         """Return why an alternative isn't in the plan.
 
         The answer has the failing conditions of the alternative, or a plan with the alternative and the additional cost of this
-        plan.
+        plan. This plan is made with the options of this result, and for the soft goals that the present plan meets. If no such
+        plan is found, the planner chooses the soft goals anew. The answer names the soft goals that only one of both plans meets.
 
         Parameters
         ----------
@@ -373,13 +377,26 @@ class Result(metaclass=RightNames):
             raise KnowledgeError("the alternative is empty; wanted a goal, or a behaviour with individuals")
         asked = " ".join(words)
 
+        limit = self.options.time_limit
+        options = replace(self.options, time_limit=limit.seconds if isinstance(limit, Deadline) else limit)
+
         def ask(problem: Problem) -> Outcome:
-            return solve(Request(problem, DEFAULT_MODE))
+            memory = options.memory if not isinstance(options.memory, str | Path) else None
+            reading, how = self.part or self.scene.reading, Searching(options.strategy)
+            with within(options.limit) as deadline:
+                task = PlanningTask(self.scene, [], memory, options, deadline, reading, problem, None, 0.0)
+                return solve(own_request(task, problem, how, engines=False))
 
         def replan(goals: Sequence[str]) -> tuple[Problem, Outcome, Labels]:
-            other = plan(self.scene, goals)
+            other = plan_by(self.scene, [*goals], options, choosing=not self.solved)
+            met = {str(goal.fact) for goal in soft if goal.met}
+            if not other.solved and (hard := [goal for goal in goals[:-1] if goal not in met]) != [*goals[:-1]]:
+                other = plan_by(self.scene, [*hard, goals[-1]], options)
             other = other.in_whole_scene() if choice else other
-            return other.problem, other.outcome, other.labels
+            return priced(other.problem), other.outcome, other.labels
+
+        def priced(problem: Problem) -> Problem:
+            return with_unit_costs(problem) if options.minimise == "steps" else problem
 
         with within(seconds), paused_collection():
             choice = BY.search(asked) is not None  # perhaps only the whole scene has the individual
@@ -387,9 +404,9 @@ class Result(metaclass=RightNames):
                 return self.in_whole_scene().why_not(asked, instead)
             labels = self.labels
             place = None if instead is None else find_step(self.plan, instead, labels)
-            soft = {goal.fact: goal.weight for goal in self.soft_goals}
+            soft = self.soft_goals
             try:
-                told = why_not(asked, self.problem, self.outcome.plan, labels, ask, replan, place, soft)
+                told = why_not(asked, priced(self.problem), self.outcome.plan, labels, ask, replan, place, soft)
             except KnowledgeError:  # possibly only the whole scene has an individual of the text
                 if self.part is None:
                     raise

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from fractions import Fraction
 from typing import TYPE_CHECKING, TypeAlias
 
 from confab.formats import AccountJson, BecauseJson, WhyNotJson
@@ -16,8 +15,9 @@ from confab.planner.contrast import Ask, Contrast, NoChoiceError, instead_of, wi
 from confab.planner.finding import StepPosition, UnknownStepError, find
 from confab.planner.finding import numbers as numbered
 from confab.planner.levels import levels_left
-from confab.planner.plan import Outcome, Plan, Status, Step
+from confab.planner.plan import Outcome, Plan, SoftGoal, Status, Step
 from confab.planner.plan_costs import cost_of
+from confab.planner.validation import unmet_goals
 from confab.reasoner.amounts import written
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import check
@@ -332,7 +332,7 @@ def why_not(
     ask: Ask,
     replan: Replan,
     instead: Step | None = None,
-    soft: Mapping[Fact, Fraction] | None = None,
+    soft: Sequence[SoftGoal] = (),
 ) -> WhyNot:
     """Return why an alternative isn't in the plan.
 
@@ -350,7 +350,7 @@ def why_not(
         Functions that plan: `ask` plans in a given problem, and `replan` plans in the scene for other goals.
     instead : Step, optional
         The step that the behaviour would replace.
-    soft : mapping of Fact to weight, optional
+    soft : sequence of SoftGoal, optional
         The soft goals of the task.
 
     Raises
@@ -386,7 +386,7 @@ def why_not(
         raise KnowledgeError(
             f"'{asked}' is neither a fact ('{example}', maybe with 'by INDIVIDUAL') nor a behaviour with individuals{hint}"
         )
-    return _fact_told(asked, fact, by[1] if by else None, problem, plan, labels, ask, replan, soft or {})
+    return _fact_told(asked, fact, by[1] if by else None, problem, plan, labels, ask, replan, soft)
 
 
 def _given(problem: Problem, behavior: Behavior, text: str) -> dict[str, str]:
@@ -435,7 +435,7 @@ def _fact_told(
     labels: Labels,
     ask: Ask,
     replan: Replan,
-    soft: Mapping[Fact, Fraction],
+    soft: Sequence[SoftGoal],
 ) -> WhyNot:
     about, of, *_ = fact.split()
     given = [Fact(*goal) for goal in sorted(problem.goal.items())]
@@ -452,7 +452,7 @@ def _fact_told(
             problem, outcome, labels = replan([*goals, fact])
     words = labels.fact(Fact(symbol, value))
     others = [labels.fact(goal) for goal in replaced if goal.value != value]
-    weight = soft.get(Fact(symbol, value))
+    weight = next((goal.weight for goal in soft if goal.fact == Fact(symbol, value)), None)
     kind = "goal" if weight is None else f"soft goal (weight {written(weight)})"
     if by is None and problem.goal.get(symbol) == value and outcome.plan is plan is not None:
         return WhyNot(asked, f"this is a {kind} already: {words}", more=0.0)
@@ -463,19 +463,24 @@ def _fact_told(
             known = problem.individuals
             raise KnowledgeError(f"unknown individual '{by}' in '{asked}'{nearest(by, known)}")
         try:
-            found = with_choice(problem, base, Symbol(symbol.situation, symbol.arguments), by, ask)
+            found = with_choice(problem, base, symbol, by, ask)
+            if found.plan is None and (kept := {goal.fact.symbol for goal in soft} & problem.goal.keys() - {symbol}):
+                found = with_choice(problem.only(kept), base, symbol, by, ask)
         except NoChoiceError as error:
             return WhyNot(asked, str(error))
         words += f", with {labels.name(by)} in every step that changes “{labels.about(symbol)}”"
         found = replace(found, before=before)
     else:
         cost = None if outcome.plan is None else cost_of(problem, outcome.plan)
-        found = Contrast(before, plan=outcome.plan, cost=cost, reason=outcome.reason)
+        found = Contrast(before, plan=outcome.plan, cost=cost, proved=outcome.proved, reason=outcome.reason)
     if found.plan is None:
         which = "" if weight is None else f"the {kind} "
         reason = found.reason.text if found.reason else "no reason is known"
         return WhyNot(asked, f"no plan achieves {which}that {words}: {reason}")
-    words += f", in place of the goal that {' and '.join(others)}," if others else ""
+    aside = [f"in place of the goal that {' and '.join(others)}"] if others else []
+    if plan is not None:
+        aside += _exchanged(problem, found.plan, labels, [goal for goal in soft if goal.fact.symbol != symbol])
+    words += f", {', '.join(aside)}," if aside else ""
     return _planned(asked, f"the {kind} that {words}", problem, plan, labels, found)
 
 
@@ -490,10 +495,21 @@ def _planned(asked: str, what: str, problem: Problem, plan: Plan | None, labels:
     more = found.cost - found.before
     count = f"{len(found.plan.primitives)} primitives instead of {len(plan.primitives)}"
     said = f"costs {more:g} more" if more > 0 else "costs the same" if more == 0 else f"costs {-more:g} less"
+    price = f" and {said}" if found.proved else f", and the plan that was found {said}"
     if breaks := _breaks(problem, plan, found.plan, labels):
         said = f"is possible, but the plan that was found violates a condition of a level above, and {said} ({count}):"
         return WhyNot(asked, f"{what} {said}", (), found.plan, more, steps, breaks)
-    return WhyNot(asked, f"{what} is possible and {said} ({count}):", (), found.plan, more, steps)
+    return WhyNot(asked, f"{what} is possible{price} ({count}):", (), found.plan, more, steps)
+
+
+def _exchanged(problem: Problem, plan: Plan, labels: Labels, soft: Sequence[SoftGoal]) -> list[str]:
+    """Return phrases on the soft goals that either the plan or, according to `soft`, the present plan leaves unmet."""
+    unmet = unmet_goals(replace(problem, goal={goal.fact.symbol: goal.fact.value for goal in soft}), plan)
+    return [
+        f"{'without' if goal.met else 'with'} the soft goal (weight {written(goal.weight)}) that {labels.fact(goal.fact)}"
+        for goal in soft
+        if goal.met == (goal.fact.symbol in unmet)
+    ]
 
 
 def _breaks(problem: Problem, plan: Plan, other: Plan, labels: Labels) -> tuple[str, ...]:

@@ -19,6 +19,7 @@ from confab.planner.checked_conditions import Bindings, variables
 from confab.planner.levels import failing_conditions
 from confab.planner.plan import Outcome, Plan, Reason, Step, renumbered
 from confab.planner.plan_costs import cost_of
+from confab.planner.solve import Request, solve
 from confab.planner.validation import BehaviorReader, LoggedState, followed, successor, validate
 from confab.reasoner.amounts import Amount
 from confab.reasoner.symbols import (
@@ -53,8 +54,9 @@ class Contrast:
     `behavior` and `arguments` are the requested step, if a step was requested; `instead` is the step of the plan that
     the requested step replaces. `lacks` lists the failing conditions, if the requested step isn't applicable. `plan` is
     the complete plan with the alternative; `cost` is the cost of that plan, and `before` is the cost of the original
-    plan. `reason` states why no plan with the alternative was found. If `lacks`, `plan` and `reason` are all empty, the
-    original plan already contains the step, as `instead`.
+    plan. `proved` states whether every complete plan with the alternative costs at least as much. `reason` states why no plan
+    with the alternative was found. If `lacks`, `plan` and `reason` are all empty, the original plan already contains the step, as
+    `instead`.
     """
 
     before: float
@@ -64,6 +66,7 @@ class Contrast:
     lacks: tuple[Condition, ...] = ()
     plan: Plan | None = None
     cost: float | None = None
+    proved: bool = False
     reason: Reason | None = None
 
 
@@ -122,17 +125,21 @@ def instead_of(
         ),
     )
     asked = Contrast(before, behavior.name, arguments, course[at])
-    step, why = _refined(problem, states[at], behavior, arguments, ask)
+    step, why = _refined(problem, states[at], behavior, arguments)
     if step is None:
         return replace(asked, reason=why)
     after = followed(problem, Plan((step,)).primitives, states[at]) or states[at]
-    rest = ask(_from(problem, behavior.level, after))
+    later, lowest = _from(problem, behavior.level, after), problem.domain.levels[-1]
+    rest = ask(later)
     if rest.plan is None:
         return replace(asked, reason=rest.reason)
     whole = Plan(renumbered((*course[:at], step, *rest.plan.steps)))
     if faults := validate(problem, whole):
         return replace(asked, reason=Reason(faults[0].text))
-    return replace(asked, plan=whole, cost=cost_of(problem, whole))
+    same = (
+        later.goal_on(lowest).items() <= problem.goal_on(lowest).items()
+    )  # the kept steps may have put something at rest
+    return replace(asked, plan=whole, cost=cost_of(problem, whole), proved=rest.proved and same and not step.steps)
 
 
 def with_choice(problem: Problem, plan: Plan, symbol: Symbol, individual: str, ask: Ask) -> Contrast:
@@ -150,7 +157,7 @@ def with_choice(problem: Problem, plan: Plan, symbol: Symbol, individual: str, a
     before = cost_of(problem, plan)
     if outcome.plan is None:
         return Contrast(before, reason=outcome.reason)
-    return Contrast(before, plan=outcome.plan, cost=cost_of(problem, outcome.plan))
+    return Contrast(before, plan=outcome.plan, cost=cost_of(problem, outcome.plan), proved=outcome.proved)
 
 
 def _beyond(
@@ -217,7 +224,7 @@ def _fewest_failures(
 
 
 def _refined(
-    problem: Problem, state: State, behavior: Behavior, arguments: tuple[str, ...], ask: Ask
+    problem: Problem, state: State, behavior: Behavior, arguments: tuple[str, ...]
 ) -> tuple[Step | None, Reason | None]:
     """Return a step with its refinement from a state, or the reason why the step has no refinement."""
     step = Step((0,), problem.id_of(behavior.name, arguments), behavior.level, behavior.name, arguments)
@@ -229,7 +236,7 @@ def _refined(
     lower = {b.name: b for b in problem.domain.behaviors.values() if b.level > behavior.level}
     goal = {symbol: value for symbol, value in after.items() if state.get(symbol) != value}
     domain = replace(problem.domain, behaviors={behavior.name: forced, **lower})
-    outcome = ask(replace(problem, domain=domain, initial=state, goal=goal))
+    outcome = solve(Request(replace(problem, domain=domain, initial=state, goal=goal)))
     if outcome.plan is None or [one.behavior for step in outcome.plan.steps for one in step.together] != [
         behavior.name
     ]:
