@@ -78,7 +78,7 @@ if TYPE_CHECKING:
     metavar="FILE",
     help="File of observed facts, which replace the scene's facts.",
 )
-@click.option("--diff", metavar="OLD_SCENE", help="Print the differences from this scene and its plan.")
+@click.option("--diff", metavar="OLD_SCENE", help="Only print the differences from this scene and its plan in --mode.")
 @click.option(
     "--engine", metavar="NAME", help="An engine of unified-planning; none: no engine even if the search gives up."
 )
@@ -120,6 +120,21 @@ def plan(
     from confab.show import summary
 
     free = leaves_levels(levels)
+    others = {
+        "--memory": memory,
+        "--optimal": optimal or None,
+        "--levels strict": None if free else levels,
+        "--from-observed": observed,
+        "--engine": engine,
+        "--level": level,
+        "--minimise": minimise,
+        "--report": report,
+        "-o": out,
+    }
+    if diff is not None and (unused := [name for name, given in others.items() if given is not None]):
+        raise KnowledgeError(
+            f"--diff compares two scenes, each with a new plan of --mode; leave out {' and '.join(unused)}"
+        )
     with limited(time_limit) as deadline:
         loaded = load_scene(scene, iri)
         if diff is not None:

@@ -92,6 +92,19 @@ def test_the_difference_of_two_scenes_names_changed_facts_and_goals_and_the_reas
     assert str(difference(both, both, "guarded")).startswith("unsolvable: cup1 LOCATION location7 and")
 
 
+def test_a_comparison_of_scenes_names_the_options_that_it_does_not_take(tmp_path: Path) -> None:
+    compare = ["plan", "living-room", "--diff", "living-room"]
+    files = ["-o", str(tmp_path / "plan.json"), "--report", str(tmp_path / "plan.html")]
+    others = ["--optimal", "--levels", "strict", "--minimise", "steps", "--level", "1", "--engine", "none"]
+    done = CliRunner().invoke(app, [*compare, *files, *others])
+    assert isinstance(done.exception, KnowledgeError)
+    for option in (*files[::2], "--optimal", "--levels strict", "--minimise", "--level", "--engine"):
+        assert f"{option} " in f"{done.exception} ", option
+    assert not list(tmp_path.iterdir())
+    for taken in (["--mode", "paper"], ["--json"], ["--time-limit", "60"], ["--no-memory"]):
+        assert CliRunner().invoke(app, [*compare, *taken]).exit_code == 0, taken
+
+
 def test_plans_that_differ_only_in_the_values_of_variables_are_different() -> None:
     scene = confab.load("beverage-serving")
     said = str(difference(scene, scene.with_fact("cup1 LOCATION location6"), "guarded"))
