@@ -44,6 +44,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "confab query beverage-serving --show B2_PICK --update",
         "confab query beverage-serving --affords cup1",
         "confab query beverage-serving --facts",
+        "confab query packing-small --derived",
     ),
     "serve": (
         "confab serve beverage-serving",

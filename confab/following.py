@@ -38,15 +38,13 @@ def write_following(graph: KnowledgeGraph, read: Callable[[], Reading], sparql: 
     problem, properties = reading.problem, value_properties(graph)
     classes: dict[str, list[str]] = {}
     stored = {name for name, one in problem.domain.aggregates.items() if one.kept} | problem.domain.remembers.keys()
-    for situation in (*problem.domain.rules, *sorted(stored)):
-        iri = reading.names.iri(situation) if situation in reading.names else ""
-        if iri not in reading.schema.nodes:
-            continue  # a situation type that expresses a constraint
+    for situation in defined_in(reading, (*problem.domain.rules, *sorted(stored))):
+        iri = reading.names.iri(situation)
         of = list(reading.schema.nodes[iri].get(CORE + "holdsOf", ()))
         words = (local_name(one) for one in (iri, properties.get(iri, iri), *of))
         if any(re.search(rf"(?<!\w){re.escape(word)}(?!\w)", sparql) for word in words):
             classes[situation] = of
-    facts = [Fact(symbol, TRUE) for symbol in _following(problem, [name for name in classes if name not in stored])]
+    facts = [Fact(symbol, TRUE) for symbol in following(problem, [name for name in classes if name not in stored])]
     known = sorted(symbol for symbol in problem.initial if symbol.situation in stored and symbol.situation in classes)
     facts += [Fact(symbol, problem.initial[symbol]) for symbol in known]
     for count, fact in enumerate(facts):
@@ -57,7 +55,14 @@ def write_following(graph: KnowledgeGraph, read: Callable[[], Reading], sparql: 
         graph.extend(DERIVED, triples)
 
 
-def _following(problem: Problem, situations: Collection[str]) -> Iterator[Symbol]:
+def defined_in(reading: Reading, situations: Collection[str] | None = None) -> list[str]:
+    """Return the situation types, by default all that rules define, without those that only express constraints."""
+    names, nodes = reading.names, reading.schema.nodes
+    given = reading.problem.domain.rules if situations is None else situations
+    return [name for name in given if name in names and names.iri(name) in nodes]
+
+
+def following(problem: Problem, situations: Collection[str]) -> Iterator[Symbol]:
     """Yield, for some defined situation types, the symbols that are true in the initial state."""
     if not situations:
         return

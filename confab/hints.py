@@ -16,12 +16,13 @@ OVERVIEW: Mapping[str, str] = {
     "scene.explain(); to try: scene.verify(), scene.execute(); to show: scene.picture(FILE), scene.plan().report(FILE), "
     "scene.serve(); to learn: confab.Memory.of(SCENE), confab.Memory.load(FILE), confab.practise(SCENES); to limit time: "
     "confab.within(SECONDS); also: Memory, Scene, Result, Report, Execution, Table, Curve, KnowledgeError, __version__",
-    "scene": "to read: facts, objects, goals, behaviors, problem.classes, problem.domain.situations, embodiment, title; to ask: "
-    "query(TEXT), affordances(OBJECT), explain(); to change (a copy): with_fact(FACT), with_goal(FACT), without_goal(GOAL); to "
-    "plan: plan(); to try: verify(), execute(); to show: picture(FILE), board(), serve(), plan().report(FILE); to save: "
-    "save(FILE), export(FOLDER), to_pddl(); to read files: read_plan(FILE), read_result(FILE), read_episode(FILE), "
-    "read_report(FILE, PLAN); to use libraries: graph, owl, to_unified_planning(); also: iri, with_episodes(FILE), problem, "
-    "knowledge, names, seconds, reading, read_whole, settle, construct, applicable_query, quantifying_query, update_of",
+    "scene": "to read: facts, derived_facts, objects, goals, behaviors, problem.classes, problem.domain.situations, embodiment, "
+    "title; to ask: query(TEXT), affordances(OBJECT), explain(); to change (a copy): with_fact(FACT), with_goal(FACT), "
+    "without_goal(GOAL); to plan: plan(); to try: verify(), execute(); to show: picture(FILE), board(), serve(), "
+    "plan().report(FILE); to save: save(FILE), export(FOLDER), to_pddl(); to read files: read_plan(FILE), "
+    "read_result(FILE), read_episode(FILE), read_report(FILE, PLAN); to use libraries: graph, owl, to_unified_planning(); "
+    "also: iri, with_episodes(FILE), problem, knowledge, names, seconds, reading, read_whole, settle, construct, "
+    "applicable_query, quantifying_query, update_of",
     "result": "to read: solved, cost, seconds, goals, outcome.status, outcome.reason, outcome.bound, outcome.search, timed, "
     "soft_goals; to walk: plan.steps, plan.primitives, plan.length, plan.at_level(LEVEL); to ask: why(STEP), why_not(WHAT), "
     "explain(), labels, purposes, dearer(), certificate; to try: verify(), execute(); to show: print(result), report(FILE), "
@@ -276,8 +277,8 @@ HINTS: Mapping[str, Mapping[str, str]] = {
         "execute().reached": "done success succeeded reward",
         "facts == other.facts (confab plan SCENE --diff OLD says what changed in the plan)": "equals delta compare diff "
         "difference compare_to same_as",
-        "[goal for goal in scene.goals if goal not in scene.facts]": "satisfied unsatisfied_goals unmet_goals open_goals "
-        "check_goal goals_met is_goal goal_reached is_done remaining_goals",
+        "[goal for goal in scene.goals if goal not in scene.facts + scene.derived_facts]": "satisfied unsatisfied_goals "
+        "unmet_goals open_goals check_goal goals_met is_goal goal_reached is_done remaining_goals",
         "knowledge.files": "imports files sources owl_imports imported_ontologies",
         "plan(memory=FILE)": "load_memory use_memory set_memory with_memory",
         "verify(seed=SEED)": "seed rng set_seed random_seed",
@@ -493,6 +494,7 @@ COMMANDS = {
     "query": "ask sparql select triples rdf q get arq individuals where search-graph",
     "query SCENE --facts": "facts state find-facts list-facts objects locations initial-state describe inspect",
     "query SCENE what-is-wanted": "goals list-goals",
+    "query SCENE --derived": "derived-facts inferred-facts",
     "query SCENE --affords all": "affordances applicable affords actions possible",
     "query SCENE --show BEHAVIOR": "behaviors behaviours operators skills show-query",
     "serve": "server web ui gui app endpoint dashboard live host http watch browser board open webui edit interactive rviz "

@@ -20,7 +20,7 @@ from confab.reasoner.limits import checked, within
 from confab.reasoner.names import GUESSING, Named, Names, RightNames, local_name, nearest, right_names
 from confab.reasoner.reading.goals import parse_fact, some_of
 from confab.reasoner.reading.problem import Reading, read, read_names
-from confab.reasoner.symbols import Behavior, Fact, Problem
+from confab.reasoner.symbols import TRUE, Behavior, Fact, Problem
 from confab.table import Table
 
 if TYPE_CHECKING:
@@ -174,7 +174,9 @@ class Known(metaclass=RightNames):
 
     @property
     def facts(self) -> Stated:
-        """The initial facts as texts, in the notation of `with_fact`.
+        """The initial facts as texts, in the notation of `with_fact`: stated facts, default values, and derived amounts.
+
+        A boolean that isn't stated and has no default is false. The true booleans that rules define are in `derived_facts`.
 
         Examples
         --------
@@ -185,6 +187,22 @@ class Known(metaclass=RightNames):
         """
         self.settle()
         return Stated(sorted(str(Fact(symbol, value)) for symbol, value in self.problem.initial.items()))
+
+    @property
+    def derived_facts(self) -> Stated:
+        """The facts that definitions and rules make true in the initial state, as texts.
+
+        Examples
+        --------
+        >>> import confab
+        >>> confab.load("packing-small").derived_facts[:2]
+        ['casket INSIDE chest true', 'casket INSIDE hall true']
+        """
+        from confab.following import defined_in, following
+
+        self.settle()
+        found = following(self.problem, defined_in(self.reading))
+        return Stated(sorted(str(Fact(symbol, TRUE)) for symbol in found))
 
     @property
     def goals(self) -> Stated:

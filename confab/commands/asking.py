@@ -98,9 +98,8 @@ FORMS = {
 )
 @click.option("--update", is_flag=True, help="With --show: the behaviour as a SPARQL update.")
 @click.option("--affords", metavar="OBJECT", help="List the behaviours that an object affords; 'all' for every object.")
-@click.option(
-    "--facts", is_flag=True, help="List all initial facts, also default and derived ones, as --fact takes them."
-)
+@click.option("--facts", is_flag=True, help="List the initial facts: stated facts, default values and derived amounts.")
+@click.option("--derived", is_flag=True, help="List the facts that definitions and rules make true initially.")
 @click.option("--format", "form", help="Format: table, csv, json, tsv, sparql-json or sparql-xml.")
 @click.option("--iris", is_flag=True, help="Print full IRIs instead of short names.")
 @output_option(type=Output(), metavar="FILE", help="File to write; FILE.ttl gets the triples of a CONSTRUCT query.")
@@ -119,6 +118,7 @@ def query(
     update: bool,
     affords: str | None,
     facts: bool,
+    derived: bool,
     form: str | None,
     iris: bool,
     out: Path | None,
@@ -134,7 +134,13 @@ def query(
     limits = QueryLimits(seconds=time_limit, rows=rows, service=service)
     if sparql == "-":
         sparql = sys.stdin.read()
-    asked = {"QUERY": sparql, "--show": show, "--affords": affords, "--facts": facts or None}
+    asked = {
+        "QUERY": sparql,
+        "--show": show,
+        "--affords": affords,
+        "--facts": facts or None,
+        "--derived": derived or None,
+    }
     given = [name for name, value in asked.items() if value is not None]
     if len(given) > 1:
         raise KnowledgeError(f"{' and '.join(given)} exclude each other; give one")
@@ -157,8 +163,8 @@ def query(
 
             shipped = ", ".join(shipped_queries(loaded.knowledge))
             raise KnowledgeError(
-                f"no query; give SPARQL text, a .rq file, a shipped query ({shipped}), --facts, --show BEHAVIOR "
-                "or --affords OBJECT"
+                f"no query; give SPARQL text, a .rq file, a shipped query ({shipped}), --facts, --derived, "
+                "--show BEHAVIOR or --affords OBJECT"
             )
         if out is not None and out.suffix.lower() == ".ttl":
             if sparql is None:
@@ -166,8 +172,8 @@ def query(
             told(out, f"{loaded.construct(sparql, out, limits)} triples")
             return
         with progress("asking"):
-            if facts:
-                table = Table(("fact",), tuple((fact,) for fact in loaded.facts))
+            if facts or derived:
+                table = Table(("fact",), tuple((fact,) for fact in (loaded.facts if facts else loaded.derived_facts)))
             else:
                 table = loaded.affordances(affords) if sparql is None else loaded.query(sparql, limits)
     form = form or ("json" if as_json else FORMS.get(out.suffix.lower()) if out not in (None, STDOUT) else "table")

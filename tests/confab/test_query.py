@@ -13,7 +13,7 @@ import confab
 from confab import ontology
 from confab.authoring import new_domain
 from confab.cli import app
-from confab.following import _following
+from confab.following import following
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.graph.query_process import QueryLimits
 from confab.reasoner.limits import LimitError, within
@@ -223,7 +223,7 @@ def test_a_query_about_derived_facts_does_not_change_the_scene() -> None:
 def test_the_derivation_of_facts_for_a_query_keeps_the_time_limit_of_the_query() -> None:
     problem = confab.load("packing-small").problem
     with within(0.0), pytest.raises(LimitError, match="gave up after 0 s while"):
-        list(_following(problem, ["INSIDE"]))
+        list(following(problem, ["INSIDE"]))
     with pytest.raises(LimitError):
         confab.load("packing-small").query(INSIDE, QueryLimits(seconds=0.0))
 
@@ -233,3 +233,20 @@ def test_a_query_finds_the_sums_and_counts_that_it_names() -> None:
     assert carts.query("SELECT ?cart ?load WHERE { ?cart d:load ?load }").values() == [("cart", 0)]
     stock = carts.query("SELECT ?rack ?stock WHERE { ?rack d:stock ?stock } ORDER BY ?rack").values()
     assert stock == [("shop", 0), ("store", 3)]
+
+
+def test_the_facts_that_rules_make_true_are_listed_apart_from_the_facts_that_can_be_given() -> None:
+    packing = confab.load("packing-small")
+    derived = packing.derived_facts
+    assert [fact.split()[::2] for fact in derived if " INSIDE " in fact] == [list(row) for row in packing.query(INSIDE)]
+    assert "casket OUT_OF_REACH true" in derived
+    assert packing.derived_facts["ring INSIDE hall"] == "true"
+    assert not {*derived} & {*packing.facts}
+    assert packing.with_fact(*packing.facts).facts == packing.facts
+    moved = packing.with_fact("ring LIES_IN casket")
+    assert {"ring INSIDE casket true", "ring INSIDE chest true"} < {*moved.derived_facts}
+    assert confab.load("tour-small").derived_facts == [
+        "station VISITED true"
+    ]  # and no type that expresses a constraint
+    done = CliRunner().invoke(app, ["query", "packing-small", "--derived", "--format", "csv"])
+    assert done.output.splitlines() == ["fact", *derived]
