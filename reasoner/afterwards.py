@@ -129,7 +129,7 @@ class Afterwards:
         self._known = {
             (c.situation, c.arguments): FALSE if c.negated else c.value
             for c in preconditions
-            if isinstance(c, ValueCondition) and (not c.negated or (self.boolean(c.situation) and c.value == TRUE))
+            if isinstance(c, ValueCondition) and (not c.negated or (c.value == TRUE and self.boolean(c)))
         }
         self._different = {
             pair
@@ -142,9 +142,11 @@ class Afterwards:
         """Return whether a term is an individual, or a variable that the preconditions bind."""
         return not is_variable(term) or term in self._fixed
 
-    def boolean(self, situation: str) -> bool:
-        """Return whether the values of a situation type are true and false."""
-        return self.situations[situation].boolean
+    def boolean(self, condition: ValueCondition) -> bool:
+        """Return whether a symbol has either the value true or false, because all its individuals have the situation type."""
+        kind = self.situations[condition.situation]
+        having = zip(condition.arguments, kind.arguments, strict=True)
+        return kind.boolean and all(self.among(term, of) is True for term, of in having)
 
     @cached_property
     def amounts(self) -> tuple[AmountEffect, ...]:

@@ -168,6 +168,23 @@ def test_the_bound_of_a_count_holds_even_if_no_goal_and_no_behaviour_names_its_i
     assert confab.load(tmp_path / "more.ttl").plan().plan.length == {1: 2}
 
 
+DIMMED = """
+:Dimmable a owl:Class, owl:NamedIndividual ; rdfs:subClassOf :Lamp ; c:hasSituationType :DIM .
+:DIM a owl:Class, owl:NamedIndividual, c:SituationType .
+:l3 a owl:NamedIndividual, :Dimmable ; c:index 4 .
+"""
+
+
+def test_a_count_of_a_false_situation_leaves_out_the_individuals_that_lack_the_situation_type(tmp_path: Path) -> None:
+    bright = LAMPS.replace(":ON true } GROUP", ":ON true ; :DIM false } GROUP")
+    bright = bright.replace(":ON false }", ":ON false FILTER NOT EXISTS { ?l :DIM true } }") + DIMMED
+    assert bright.count(":DIM false } GROUP") == bright.count(":DIM true }") == 1
+    (tmp_path / "lacking.ttl").write_text(bright)
+    (tmp_path / "having.ttl").write_text(bright.replace(", :Lamp ;", ", :Dimmable ;"))
+    assert confab.load(tmp_path / "lacking.ttl").plan().plan.length == {1: 2}
+    assert confab.load(tmp_path / "having.ttl").plan().outcome.status is Status.UNSOLVABLE
+
+
 WATTS = ":watts a owl:DatatypeProperty, owl:NamedIndividual, c:Relation ; rdfs:domain :Lamp ; rdfs:range xsd:integer ."
 
 
