@@ -29,7 +29,6 @@ from confab.reasoner.reading.rows import (
     Member,
     OntologySchema,
     classes_of,
-    derived_goals,
     goals_of,
     is_a,
     ordered,
@@ -158,17 +157,13 @@ def names_of(schema: OntologySchema, members: Iterable[Member], namesakes: Itera
     """Return unique short names for a schema's terms, some individuals, and other IRIs with the same local names."""
     nodes = schema.nodes
     typed = (nodes[iri] for iri in schema.of_kind("Parameter", "Variable", *WITH_CLASS))
-    derived = {
-        *derived_goals(schema),
-        *(iri for iri in checked(goals_of(nodes), "reading the scene") if CORE + "weight" in nodes[iri]),
-    }
     return Names(
         {
             *schema.of_kind("SituationType", "Behavior", "Relation", "ReachRelation"),
             *(iri for iri in namesakes if iri not in nodes),
-            *derived,
+            *checked(goals_of(nodes), "reading the scene"),
+            *schema.of_kind("Task"),
             *iris_of_the_past(schema),
-            *(task for task in schema.of_kind("Task") if derived.intersection(nodes[task].get(CORE + "goal", ()))),
             *chain.from_iterable(
                 (iri, kind) for iri, kind, _ in checked(members, "reading the scene") if iri not in nodes
             ),

@@ -508,11 +508,9 @@ def _goal_individuals(schema: OntologySchema) -> set[str]:
 
 
 def _goal_classes(schema: OntologySchema) -> set[str]:
-    """Return the classes that stand for all their members in goals, and the classes of the values that goals exclude."""
+    """Return the classes that stand for all their members in goals."""
     goals = [schema.nodes.get(iri, {}) for iri in goal_conditions(schema)]
-    wanted = {v for node in goals for name in PLACES for v in node.get(name, ()) if v in schema.individuals_of}
-    negated = (node for node in goals if {"true", "1"}.intersection(node.get(CORE + "negated", ())))
-    return wanted | {v for node in negated for v in node.get(CORE + "situationType", ()) if v not in schema.pairs}
+    return {v for node in goals for name in PLACES for v in node.get(name, ()) if v in schema.individuals_of}
 
 
 def _situations_in(goals: Sequence[str], known: Frame) -> set[str]:

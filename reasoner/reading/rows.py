@@ -277,20 +277,13 @@ def derived_goals(schema: OntologySchema) -> list[str]:
     }
 
     def fact(node: NodeValues) -> bool:
+        said = {name.removeprefix(CORE): {*values} for name, values in node.items()}
+        types, negated = said.get("situationType", set()), not {"true", "1"}.isdisjoint(said.get("negated", ()))
         if is_a(node, "Comparison"):
-            plain = (
-                CORE + "amount" in node and not {CORE + name for name in ("left", "right", "relation")} & node.keys()
-            )
-            return plain and not extrema.intersection(node.get(CORE + "situationType", ()))
-        return is_a(node, "ValueCondition") and not (
-            {"true", "1"}.intersection(node.get(CORE + "negated", ())) and valued(node)
-        )
-
-    def valued(node: NodeValues) -> bool:
-        return any(
-            CORE + "valueProperty" in schema.nodes.get(situation, {}) and situation not in schema.pairs
-            for situation in node.get(CORE + "situationType", ())
-        )
+            plain = "amount" in said and {"left", "right", "relation"}.isdisjoint(said) and extrema.isdisjoint(types)
+            return plain and not (negated and "=" in said.get("sign", ()))
+        boolean = said.get("value", set()) <= {CORE + "true", CORE + "false"} or not schema.pairs.isdisjoint(types)
+        return is_a(node, "ValueCondition") and (boolean or not negated)
 
     goals = checked(goals_of(schema.nodes), "reading the scene")
     return sorted(iri for iri in goals if not fact(schema.nodes[iri]))

@@ -98,3 +98,51 @@ def test_a_goal_that_lacks_or_repeats_a_part_is_refused_by_name(said: str, fault
     (tmp_path / "scene.ttl").write_text(f"{head}  c:goal :order.wrong{rest}{goal}\n", "utf-8")
     with pytest.raises(KnowledgeError, match=fault):
         confab.load(tmp_path / "scene.ttl").plan()
+
+
+HEADER = """@prefix : <https://example.org/w#> .
+@prefix c: <https://w3id.org/confab/core#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+@prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
+<https://example.org/w> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> ; c:symbolicOnly true .
+:cup a owl:NamedIndividual, :Cup .
+:task a owl:NamedIndividual, c:Task ; c:goal :wanted .
+"""
+FACING = """:Cup a owl:Class ; rdfs:subClassOf c:Object .
+:FACING a owl:Class, owl:NamedIndividual, c:SituationType ; c:parameter :FACING.1, :FACING.2 ; c:defaultValue :front .
+:FACING.1 a owl:NamedIndividual, c:Parameter ; c:index 1 ; c:termType :Cup .
+:FACING.2 a owl:NamedIndividual, c:Parameter ; c:index 2 ; c:termType :Cup .
+:front a owl:NamedIndividual, :FACING . :left a owl:NamedIndividual, :FACING . :right a owl:NamedIndividual, :FACING .
+:TURN a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:parameter :TURN.1, :TURN.2, :TURN.to ; c:postcondition :TURN.turned .
+:TURN.1 a owl:NamedIndividual, c:Parameter ; c:index 1 ; c:termType :Cup .
+:TURN.2 a owl:NamedIndividual, c:Parameter ; c:index 2 ; c:termType :Cup .
+:TURN.to a owl:NamedIndividual, c:Parameter ; c:index 3 ; c:termType :FACING .
+:TURN.turned a owl:NamedIndividual, c:ValueEffect ; c:about :TURN.1 ; c:argument2 :TURN.2 ; c:situationType :FACING ;
+  c:value :TURN.to .
+:mug a owl:NamedIndividual, :Cup .
+:wanted a owl:NamedIndividual, c:ValueCondition ; c:about :cup ; c:argument2 :mug ; c:situationType :FACING ; c:value :front ;
+  c:negated true .
+"""
+FILLED = """:Cup a owl:Class ; rdfs:subClassOf c:Object ; c:hasSituationType :FILLED .
+:FILLED a owl:NamedIndividual, c:SituationType, c:Amount ; c:valueProperty :filled .
+:filled a owl:DatatypeProperty, owl:FunctionalProperty ; rdfs:domain :Cup ; rdfs:range xsd:decimal .
+:EMPTY a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:update "INSERT { ?cup :filled 0.0 } WHERE { ?cup a :Cup }" .
+:cup :filled 4.0 .
+:wanted a owl:NamedIndividual, c:Comparison ; c:about :cup ; c:situationType :FILLED ; c:sign "=" ; c:amount 4.0 ; c:negated true .
+"""
+
+
+@pytest.mark.parametrize(
+    ("world", "step"),
+    [
+        pytest.param(FACING, "TURN cup mug left", id="the values belong to no property"),
+        pytest.param(FILLED, "EMPTY cup", id="the goal excludes one amount"),
+    ],
+)
+def test_a_goal_that_excludes_a_value_holds_with_every_other_value(world: str, step: str, tmp_path: Path) -> None:
+    (tmp_path / "w.ttl").write_text(HEADER + world, "utf-8")
+    loaded = confab.load(tmp_path / "w.ttl")
+    result = loaded.plan(optimal=True)
+    assert [f"{one.behavior} {' '.join(one.arguments)}" for one in result.plan.primitives] == [step]
+    assert result.problem.goal == {Symbol("wanted", ("task",)): TRUE}
