@@ -269,15 +269,11 @@ def with_derived_goal(problem: Problem, task: str, name: str, wanted: Condition)
 
 
 def _other_values(excluded: ValueCondition, problem: Problem) -> list[str]:
-    """Return the values that the symbol of a condition can have instead of the condition's value.
-
-    The values are counted on the lowest level that has the symbol and the condition's value.
-    """
+    """Return the values of all levels that the symbol of a condition can have instead of the condition's value."""
     check_arguments(symbol := Symbol(excluded.situation, excluded.arguments), problem.domain, "a goal")
-    if problem.domain.situations[excluded.situation].boolean:
-        return [FALSE if excluded.value == TRUE else TRUE]
-    level = max(problem.first_level(symbol), problem.value_levels.get(excluded.value, 1))
-    return [value for value in problem.values(symbol, level) if value != excluded.value]
+    kind = problem.domain.situations[symbol.situation]
+    values = (FALSE, TRUE) if kind.boolean else problem.classes.get(kind.range, ())
+    return [value for value in values if value != excluded.value]
 
 
 def _wanted(parts: Parts, iri: str, classes: Mapping[str, tuple[str, ...]]) -> list[Condition]:

@@ -109,6 +109,15 @@ HEADER = """@prefix : <https://example.org/w#> .
 :cup a owl:NamedIndividual, :Cup .
 :task a owl:NamedIndividual, c:Task ; c:goal :wanted .
 """
+HELD = """:Cup a owl:Class ; rdfs:subClassOf c:Object ; c:hasSituationType :AT .
+:AT a owl:Class, owl:NamedIndividual, c:SituationType ; c:valueProperty :at .
+:at a owl:ObjectProperty, owl:FunctionalProperty ; rdfs:domain :Cup ; rdfs:range :AT .
+:table a owl:NamedIndividual, :AT . :shelf a owl:NamedIndividual, :AT . :hand a owl:NamedIndividual, :AT ; c:fromLevel 2 .
+:MOVE a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:update "INSERT { ?cup :at ?place } WHERE { ?cup a :Cup . ?place a :AT }" .
+:GRASP a owl:NamedIndividual, c:Behavior ; c:level 2 ; c:update "INSERT { ?cup :at :hand } WHERE { ?cup a :Cup }" .
+:cup :at :table .
+:wanted a owl:NamedIndividual, c:ValueCondition ; c:about :cup ; c:situationType :AT ; c:value :table ; c:negated true .
+"""
 FACING = """:Cup a owl:Class ; rdfs:subClassOf c:Object .
 :FACING a owl:Class, owl:NamedIndividual, c:SituationType ; c:parameter :FACING.1, :FACING.2 ; c:defaultValue :front .
 :FACING.1 a owl:NamedIndividual, c:Parameter ; c:index 1 ; c:termType :Cup .
@@ -136,6 +145,7 @@ FILLED = """:Cup a owl:Class ; rdfs:subClassOf c:Object ; c:hasSituationType :FI
 @pytest.mark.parametrize(
     ("world", "step"),
     [
+        pytest.param(HELD, "GRASP cup", id="the only reachable value belongs to a lower level"),
         pytest.param(FACING, "TURN cup mug left", id="the values belong to no property"),
         pytest.param(FILLED, "EMPTY cup", id="the goal excludes one amount"),
     ],

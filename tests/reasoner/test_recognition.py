@@ -318,8 +318,8 @@ WIPE = """:WIPE a owl:NamedIndividual, c:Behavior ; c:level 2 ; c:parameter :WIP
     ("excluded", "more", "wanted"),
     [
         ("d:CLEANLINESS ; c:value d:clean", "", "dirty"),
-        ("d:CLEANLINESS ; c:value d:clean", WET + WIPE, "dirty"),
-        ("d:CLEANLINESS ; c:value d:clean", WET, ""),  # the only level sees all values
+        ("d:CLEANLINESS ; c:value d:clean", WET + WIPE, ""),
+        ("d:CLEANLINESS ; c:value d:clean", WET, ""),
         ("d:CLEANLINESS ; c:value d:clean", ":wet a owl:NamedIndividual, d:CLEANLINESS .", ""),
         ("d:PLACE ; c:value :table", "", ""),
     ],
