@@ -202,8 +202,11 @@ class _SceneWriter:
 
     @cached_property
     def measures(self) -> frozenset[str]:
-        """The relations whose last argument is a number."""
-        return measures(self.problem.domain.behaviors.values())
+        """The relations whose last argument is a number; a number that nothing reads is known by not being an individual."""
+        domain, things = self.problem.domain, self.problem.individuals
+        rules = [rule.behavior for its in domain.rules.values() for rule in its]
+        unread = (name for name, rows in self.problem.relations.items() if any(row[-1] not in things for row in rows))
+        return measures([*domain.behaviors.values(), *rules]).union(unread)
 
     def term(self, name: str, kind_of_term: str, index: int | None, kind: str) -> str:
         said = [f":{name} a owl:NamedIndividual, {kind_of_term}"]
@@ -230,7 +233,7 @@ class _SceneWriter:
             _spanned(nodes, nodes.effect(f":{one.name}.effect{position:03}", effect), span)
             for position, (span, effect) in enumerate(made, start=1)
         ]
-        cost = [] if one.cost == 1 else [f"{one.cost:f}"]
+        cost = [] if one.cost == 1 else [decimal_text(Fraction(repr(float(one.cost))))]
         price = [] if one.price is None else [nodes.calculation(one.price)]
         yield self.node(
             one.name,

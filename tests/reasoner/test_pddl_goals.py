@@ -215,3 +215,38 @@ def test_a_symbol_whose_exported_soft_goal_is_unmet_has_to_be_at_rest(wish: str,
     exported = to_pddl(problem)
     again = imported(parse(exported.domain, exported.problem)).problem
     assert total(problem) == total(again) == least
+
+
+FILL = """(:types tank) (:predicates (full) (done)) (:functions (total-cost) (level ?t - tank) (cap ?t - tank))
+ (:action fill :parameters (?t - tank) :effect (and (increase (level ?t) 1) (increase (total-cost) 1)))
+ (:action finish :parameters () :precondition (full) :effect (and (done) (increase (total-cost) 1)))"""
+FILLED = "(:objects a b - tank) (:init (= (level a) 0) (= (level b) 0) (= (cap a) 2) (= (cap b) 0) (= (total-cost) 0))"
+
+
+@pytest.mark.parametrize(
+    ("read", "goal", "steps"),
+    [
+        ("", "(>= (level a) (cap a))", ["fill a"] * 2),
+        ("", "(forall (?t - tank) (>= (level ?t) (cap ?t)))", ["fill a"] * 2),
+        ("", "(preference x (>= (level a) (+ (cap b) 1)))", ["fill a"]),
+        ("(:derived (full) (exists (?t - tank) (> (level ?t) (cap ?t))))", "(done)", ["fill b", "finish"]),
+        ("(:constraints (forall (?t - tank) (always (<= (level ?t) (cap ?t)))))", "(>= (level a) 2)", ["fill a"] * 2),
+        ("(:constraints (forall (?t - tank) (always (<= (level ?t) (cap ?t)))))", "(>= (level b) 1)", None),
+    ],
+)
+def test_a_function_that_never_changes_keeps_its_numbers_whatever_reads_it(
+    read: str, goal: str, steps: list[str] | None, tmp_path: Path
+) -> None:
+    assert (
+        cheapest(f"{FILL} {read}", f"{FILLED} (:goal {goal}) {SOFT if 'preference' in goal else ''}", tmp_path) == steps
+    )
+
+
+@pytest.mark.parametrize("factor", ["1", "0.0000001", "1e-20", "123456789"])
+def test_a_cost_is_written_with_all_its_digits(factor: str, tmp_path: Path) -> None:
+    domain = """(:predicates (g) (h)) (:functions (total-cost))
+     (:action long :parameters () :effect (and (g) (increase (total-cost) 4)))
+     (:action first :parameters () :effect (and (h) (increase (total-cost) 1)))
+     (:action second :parameters () :precondition (h) :effect (and (g) (increase (total-cost) 1)))"""
+    problem = f"(:init (= (total-cost) 0)) (:goal (g)) (:metric minimize (* {factor} (total-cost)))"
+    assert cheapest(domain, problem, tmp_path) == ["first", "second"]
