@@ -397,7 +397,9 @@ class Definitions:
             return Comparison(amount, "=", self._exact(prop, said[OWL + "hasValue"][0]))
         if OWL + "someValuesFrom" in said:
             within = self._data_range(prop, amount, said[OWL + "someValuesFrom"][0])
-            return within[0] if len(within) == 1 else AnyOf((within or (there,),))
+            if not any(isinstance(one, Comparison) and not one.negated for one in within):
+                within = (there, *within)  # negations and disjunctions may hold without a number
+            return within[0] if len(within) == 1 else AnyOf((within,))
         if OWL + "allValuesFrom" in said:
             within = self._data_range(prop, amount, said[OWL + "allValuesFrom"][0])
             return AnyOf(((replace(there, negated=True),), within))

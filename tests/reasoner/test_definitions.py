@@ -142,6 +142,34 @@ def test_membership_follows_the_state(tmp_path: Path) -> None:
     assert applicable(reading, "plate2", PLACE="sink", CLEANLINESS="dirty")
 
 
+AT_LEAST_2 = f"""[ a rdfs:Datatype ; owl:onDatatype <{XSD}decimal> ;
+    owl:withRestrictions ( [ <{XSD}minInclusive> 2.0 ] ) ]"""
+BELOW_2 = f"[ a rdfs:Datatype ; owl:datatypeComplementOf {AT_LEAST_2} ]"
+
+
+@pytest.mark.parametrize(
+    ("values", "members"),
+    [
+        (f"owl:someValuesFrom {BELOW_2}", [True, False, False]),
+        (f"owl:someValuesFrom [ a rdfs:Datatype ; owl:unionOf ( {BELOW_2} {BELOW_2} ) ]", [True, False, False]),
+        (f"owl:someValuesFrom {AT_LEAST_2}", [False, True, False]),
+        (f"owl:someValuesFrom <{XSD}decimal>", [True, True, False]),
+        (f"owl:allValuesFrom {BELOW_2}", [True, False, True]),
+        (f"owl:allValuesFrom {AT_LEAST_2}", [False, True, True]),
+    ],
+)
+def test_some_number_in_a_data_range_requires_that_there_is_a_number(
+    tmp_path: Path, values: str, members: list[bool]
+) -> None:
+    weighs = f":weighs a owl:DatatypeProperty, c:Relation ; rdfs:domain :Item ; rdfs:range <{XSD}decimal> ."
+    path = scene(tmp_path, weighs, defined(both(":Item", IS_DIRTY, restriction(":weighs", values))))
+    plates = ":plate1 d:weighs 1.0 . :plate2 d:weighs 3.0 . :plate3 a owl:NamedIndividual, d:Plate ; d:isAt :shelf ; "
+    path.write_text(f"{path.read_text()} {plates} d:cleanliness d:clean .")
+    reading = read(load(path))
+    asked = [applicable(reading, f"plate{i}", PLACE="sink", CLEANLINESS="dirty") for i in (1, 2, 3)]
+    assert asked == members
+
+
 def test_a_parameter_of_a_defined_class_ranges_over_its_base_and_is_tested_in_the_state(tmp_path: Path) -> None:
     path = scene(tmp_path, defined(both(":Plate", IS_DIRTY)), asked="Plate")
     text = (tmp_path / "washing.ttl").read_text()
