@@ -159,7 +159,7 @@ class _TreeBuilder:
         """Return the rest values of all symbols that the plan changes and that have rest values."""
         changed = {change.fact.symbol for purpose in self.purposes.values() for change in purpose.gives}
         rests = ((symbol, self.problem.domain.situations[symbol.situation].rest) for symbol in sorted(changed))
-        return [Fact(symbol, rest) for symbol, rest in rests if rest is not None and symbol not in self.problem.goal]
+        return [Fact(symbol, rest) for symbol, rest in rests if rest is not None and not self.problem.releases(symbol)]
 
     def positioning(self) -> list[TreeNode]:
         """Return the nodes that find the latest position at which all links across it are satisfied, and set the marks.

@@ -486,8 +486,7 @@ def with_hard_goals(problem: Problem) -> Problem:
     if not problem.weights:
         return problem
     goal = {symbol: value for symbol, value in problem.goal.items() if symbol not in problem.weights}
-    rests = {symbol: problem.domain.situations[symbol.situation].rest for symbol in problem.weights}
-    released = {symbol: w for symbol, w in problem.weights.items() if problem.goal.get(symbol) != rests[symbol]}
+    released = {symbol: weight for symbol, weight in problem.weights.items() if problem.may_leave_rest(symbol)}
     return replace(problem, goal=goal, weights=released)
 
 
@@ -499,7 +498,7 @@ def wanted_in_the_end(problem: Problem, fact: Fact) -> bool:
     symbol = fact.symbol
     if symbol in problem.goal:
         return problem.goal[symbol] == fact.value
-    if symbol in problem.weights or symbol.situation in problem.domain.rules:
+    if symbol.situation in problem.domain.rules or problem.releases(symbol):
         return False
     kind = problem.domain.situations[symbol.situation]
     return kind.rest == fact.value and problem.first_level(symbol) <= problem.domain.levels[-1]

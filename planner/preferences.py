@@ -93,8 +93,8 @@ def preferred(
 class _SoftGoalChoices:
     """The outcomes of planning for choices of soft goals, and lower bounds on the costs of their plans.
 
-    `briefly` are the outcomes with shortened plans. `away` are the soft goals with another value than the rest value of their
-    symbol. If such a goal isn't chosen, its symbol must be at rest in the end, so that a plan for fewer goals can cost more.
+    `briefly` are the outcomes with shortened plans. `away` are the soft goals that may demand other values than rest values. If
+    such a goal isn't chosen, the symbols that it concerns must be at rest in the end, so that a plan for fewer goals can cost more.
     `ended` and `proofs_ended` state whether the time for searches and proofs is over; each further choice would end in the same
     way. `hard` are the choices for which the search gave up; there is no search for choices with more goals.
     """
@@ -102,8 +102,7 @@ class _SoftGoalChoices:
     def __init__(self, problem: Problem, search: PlanSearch, prove: PlanSearch | None, extend: Extender | None) -> None:
         self.problem, self.search, self.prove, self.extend = problem, search, prove, extend
         self.weights = problem.weights
-        rests = {symbol: problem.domain.situations[symbol.situation].rest for symbol in problem.weights}
-        self.away = Goals(symbol for symbol, rest in rests.items() if rest not in (None, problem.goal[symbol]))
+        self.away = Goals(symbol for symbol in problem.weights if problem.may_leave_rest(symbol))
         self.outcomes: dict[Goals, Outcome] = {}
         self.briefly: dict[Goals, Outcome] = {}
         self.hard: list[Goals] = []

@@ -179,7 +179,7 @@ class _PlanExecution:
         for cell in sorted(cell for cell in touched if cell[0] in self.rests):
             symbol, got, rest = Symbol(*cell), self.facts.value(*cell) or FALSE, self.rests[cell[0]]
             own = above < self.problem.first_level(symbol) <= level
-            if got != rest and own and (inside or symbol not in self.problem.goal):
+            if got != rest and own and (inside or not self.problem.releases(symbol)):
                 self.fault(path, f"{what} touches {symbol} and leaves it {got}; at rest it is {rest}")
         return touched
 

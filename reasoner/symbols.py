@@ -627,12 +627,49 @@ class Problem:
         """Return whether a symbol and a value exist on a level."""
         return self.first_level(symbol) <= level and self.value_levels.get(value, 1) <= level
 
+    def releases(self, symbol: Symbol) -> bool:
+        """Return whether a goal is about a symbol, directly or by a definition, and so releases the symbol from its rest value."""
+        terms = self._in_definitions.get(symbol.situation, ())
+        return symbol in self.goal or symbol in self.weights or any(self._fits(symbol, one) for one in terms)
+
+    def concerns(self, goal: Symbol, symbol: Symbol) -> bool:
+        """Return whether one goal is about a symbol, directly or by a definition."""
+        return goal == symbol or any(self._fits(symbol, one) for one in self._read_by(goal).get(symbol.situation, ()))
+
+    def may_leave_rest(self, goal: Symbol) -> bool:
+        """Return whether a goal may demand other values than rest values."""
+        rest = self.domain.situations[goal.situation].rest
+        return bool(self._read_by(goal)) if rest is None else rest != self.goal.get(goal)
+
+    def _fits(self, symbol: Symbol, terms: tuple[str, ...]) -> bool:
+        return all(term == one or one in self.members(term) for term, one in zip(terms, symbol.arguments, strict=True))
+
+    @cached_property
+    def _in_definitions(self) -> Mapping[str, set[tuple[str, ...]]]:
+        """The individuals or classes of the symbols with rest values that definitions of goals read, by situation type."""
+        found: dict[str, set[tuple[str, ...]]] = {}
+        for goal in {*self.goal, *self.weights}:
+            for situation, terms in self._read_by(goal).items():
+                found.setdefault(situation, set()).update(terms)
+        return found
+
+    def _read_by(self, goal: Symbol) -> Mapping[str, set[tuple[str, ...]]]:
+        if goal.situation not in self.domain.rules and goal.situation not in self.domain.aggregates:
+            return {}
+        from confab.reasoner.derivation import read_through
+
+        found: dict[str, set[tuple[str, ...]]] = {}
+        for situation, terms in read_through(goal, self.domain):
+            if self.domain.situations[situation].rest is not None:
+                found.setdefault(situation, set()).add(terms)
+        return found
+
     def goal_on(self, level: int) -> dict[Symbol, str]:
         """Return the goal on a level: the task's goals, and the rest values that `at_rest` returns."""
         return {**self.at_rest(level), **self.goal}
 
     def at_rest(self, level: int) -> dict[Symbol, str]:
-        """Return the symbols on a level that initially have their rest value, together with this value.
+        """Return the symbols on a level that initially have their rest value, except those that a definition of a goal reads.
 
         Boolean symbols that the initial state omits are included if a behaviour of the level changes their situation type.
         """
@@ -645,7 +682,11 @@ class Problem:
             ):
                 if (symbol := Symbol(name, individuals)) not in self.initial:
                     found[symbol] = FALSE
-        return {symbol: value for symbol, value in found.items() if self.first_level(symbol) <= level}
+        return {
+            symbol: value
+            for symbol, value in found.items()
+            if self.first_level(symbol) <= level and (symbol in self.goal or not self.releases(symbol))
+        }
 
     def members(self, kind: str) -> frozenset[str]:
         """Return the members of a class as a set."""

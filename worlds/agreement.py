@@ -55,7 +55,7 @@ def cheapest(problem: Problem, successors: Successors = by_the_checker, most: in
     }
     unstated = (Symbol(name, arguments) for name, classes in of.items() for arguments in product(*classes))
     every = dict.fromkeys((*problem.initial, *unstated))
-    rests = {s: r for s in every if (r := kinds[s.situation].rest) and s not in problem.goal}
+    rests = {s: r for s in every if (r := kinds[s.situation].rest) and not problem.releases(s)}
 
     def restless(before: State, state: State, old: frozenset[Symbol]) -> frozenset[Symbol]:
         """Return the changed symbols that do not have their rest value."""

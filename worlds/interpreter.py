@@ -155,7 +155,7 @@ class Interpreter:
         return {
             i: rest
             for symbol, i in self.slots.items()
-            if (rest := self.kinds[symbol.situation].rest) is not None and symbol not in self.problem.goal
+            if (rest := self.kinds[symbol.situation].rest) is not None and not self.problem.releases(symbol)
         }
 
     def wanting(self, goal: Mapping[Symbol, str]) -> Interpreter:

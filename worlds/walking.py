@@ -74,7 +74,7 @@ class _Walk:
             symbol = self.of.symbols[slot]
             at_rest = state[slot] == self.problem.domain.situations[symbol.situation].rest
             own = above < self.problem.first_level(symbol) <= level
-            if own and not at_rest and (inside or symbol not in self.problem.goal):
+            if own and not at_rest and (inside or not self.problem.releases(symbol)):
                 self.faults.append(f"{symbol} is left {state[slot]}, not at rest")
         return state
 

@@ -25,7 +25,8 @@ from confab.planner.applicable import joins
 from confab.planner.hierarchical.call import Call
 from confab.planner.hierarchical.refinement import RefinedStep
 from confab.planner.plan import Counts
-from confab.planner.transitions import Cell, Change
+from confab.planner.transitions import Cell, Change, arguments_of
+from confab.reasoner.symbols import Symbol
 
 TRIAL = 10
 """The work of a trial in the unit of the budget."""
@@ -154,7 +155,8 @@ class UngroundedSearch:
 
     def _at_rest(self) -> bool:
         """Return whether each symbol without a goal has its rest value or its initial value in the current state."""
-        changed = self.table.since(0).keys() - self.call.goal
+        releases = self.call.problem.releases
+        changed = {cell for cell in self.table.since(0) if not releases(Symbol(cell[0], arguments_of(cell[1])))}
         return all(changed.isdisjoint(self.call.restless(level)) for level in self.call.program.levels)
 
     def _return_to(self, state: UngroundedState) -> None:

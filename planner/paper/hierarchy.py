@@ -160,11 +160,15 @@ class Target:
 
 
 def target(model: Model, above: int, level: int, before: Values, said: Goal) -> Target:
-    """Return the target of a level: the values `said` by the level above, and rest values of symbols that it doesn't see."""
+    """Return the target of a level: the values `said` by the level above, and rest values of symbols that it doesn't see.
+
+    If `above` is 0, the target is that of the task, whose goals release the symbols that they concern.
+    """
     values, restless = dict(said), dict[int, str]()
     for i, symbol in enumerate(model.symbols):
         rest = model.problem.domain.situations[symbol.situation].rest
-        if rest is not None and i not in said and above < model.first_levels[i] <= level:
+        released = not above and model.problem.releases(symbol)
+        if rest is not None and i not in said and above < model.first_levels[i] <= level and not released:
             (values if before[i] == rest else restless)[i] = rest
     return Target(values, restless)
 

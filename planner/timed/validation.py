@@ -326,7 +326,7 @@ class _TimedExecution:
             sees = self.problem.first_level(symbol) <= self.problem.domain.levels[0]
             if (
                 sees
-                and symbol not in self.problem.goal
+                and not self.problem.releases(symbol)
                 and value not in (rest or value, self.problem.initial.get(symbol, FALSE))
             ):
                 yield Fault((), f"the plan touches {symbol} and leaves it {value}; at rest it is {rest}")

@@ -129,9 +129,11 @@ class _Export:
             for symbol, weight in problem.weights.items()
             for soft in [self.lowering.goal(symbol, problem.goal[symbol])]
         ]
-        for symbol, rest in problem.at_rest(level).items():
-            if symbol in problem.weights:  # with the soft goal unmet, its symbol has to be at rest
-                wanted.append(either(self.lowering.goal(symbol, value) for value in (rest, problem.goal[symbol])))
+        for symbol, rest in problem.only(problem.weights).at_rest(level).items():
+            soft = [goal for goal in problem.weights if problem.concerns(goal, symbol)]
+            if soft:  # unless one of these soft goals is met, the symbol has to be at rest
+                ways = [(symbol, rest), *((goal, problem.goal[goal]) for goal in soft)]
+                wanted.append(either(self.lowering.goal(*way) for way in ways))
         self.goal = both([*wanted, *self.lowering.within_bounds(ActionScope({}))])
         self.facts = [*self.lowering.kept.facts(), *self.words.facts()]
         self.formulas = [*(action.needs for action in self.actions.values()), *(holds for _, _, holds in self.derived)]

@@ -1,0 +1,69 @@
+"""A goal releases the symbols that it is about, directly or by a definition, from their rest values."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import confab
+from confab.planner.validation import validate
+
+BOXES = """
+@prefix : <https://example.org/w#> .
+@prefix c: <https://w3id.org/confab/core#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+<https://example.org/w> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> ; c:symbolicOnly true .
+:Box a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object ; c:hasSituationType :LID, :FREE .
+:LID a owl:Class, owl:NamedIndividual, c:SituationType ; c:valueProperty :lid ; c:restValue :shut .
+:lid a owl:ObjectProperty, owl:FunctionalProperty, owl:NamedIndividual ; rdfs:domain :Box ; rdfs:range :LID .
+:shut a owl:NamedIndividual, :LID . :open a owl:NamedIndividual, :LID . :ajar a owl:NamedIndividual, :LID .
+:FREE a owl:Class, owl:NamedIndividual, c:SituationType .
+:FREE.rule a owl:NamedIndividual, c:Rule ; c:construct "CONSTRUCT { ?b :FREE true } WHERE { ?b a :Box ; :lid :open }" .
+:SET a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 1 ; c:update \"\"\"
+  INSERT { ?b :lid ?v } WHERE { ?b a :Box . ?v a :LID . ?b :lid ?old FILTER(?old != ?v) }\"\"\" .
+:box1 a owl:NamedIndividual, :Box ; c:index 1 ; :lid :shut .
+:box2 a owl:NamedIndividual, :Box ; c:index 2 ; :lid :shut .
+:open1 a owl:NamedIndividual, c:ValueCondition ; c:about :box1 ; c:situationType :LID ; c:value :open .
+:ajar1 a owl:NamedIndividual, c:ValueCondition ; c:about :box1 ; c:situationType :LID ; c:value :ajar .
+:shut1 a owl:NamedIndividual, c:ValueCondition ; c:about :box1 ; c:situationType :LID ; c:value :shut ; c:negated true .
+:free1 a owl:NamedIndividual, c:ValueCondition ; c:about :box1 ; c:situationType :FREE .
+:free2 a owl:NamedIndividual, c:ValueCondition ; c:about :box2 ; c:situationType :FREE .
+:either a owl:NamedIndividual, c:AnyOf ; c:alternative :open1, :ajar1 .
+:some a owl:NamedIndividual, c:Witness ; c:witness :x ; c:condition :openx .
+:x a owl:NamedIndividual, c:Variable ; c:termType :Box .
+:openx a owl:NamedIndividual, c:ValueCondition ; c:about :x ; c:situationType :LID ; c:value :open .
+:task a owl:NamedIndividual, c:Task ; c:goal GOALS .
+"""
+
+
+def boxes(folder: Path, goals: str) -> confab.Scene:
+    (folder / "w.ttl").write_text(BOXES.replace("GOALS", goals), encoding="utf-8")
+    return confab.load(folder / "w.ttl")
+
+
+@pytest.mark.parametrize("mode", ["guarded", "optimal", "paper"])
+@pytest.mark.parametrize("goal", [":shut1", ":either", ":some", ":free1"])
+def test_a_goal_of_any_form_releases_what_it_is_about(tmp_path: Path, goal: str, mode: str) -> None:
+    scene = boxes(tmp_path, goal)
+    found = scene.plan(mode=mode, engine="none").outcome  # type: ignore[arg-type]
+    assert found.plan is not None and found.plan.length == {1: 1}
+    assert validate(scene.problem, found.plan) == []
+
+
+def test_symbols_that_no_goal_is_about_return_to_rest(tmp_path: Path) -> None:
+    both = boxes(tmp_path, ":free1, :free2").plan().outcome.plan
+    assert both is not None and both.length == {1: 2}
+    assert "box1" in str(validate(boxes(tmp_path, ":free2").problem, both))
+    assert validate(boxes(tmp_path, ":some").problem, both) == []
+
+
+@pytest.mark.parametrize(("weights", "value"), [((3, 9), "ajar"), ((9, 3), "open")])
+def test_of_two_soft_goals_about_one_symbol_the_greater_weight_wins(
+    tmp_path: Path, weights: tuple[int, int], value: str
+) -> None:
+    scene = boxes(tmp_path, f":open1, :ajar1 . :open1 c:weight {weights[0]}.0 . :ajar1 c:weight {weights[1]}.0")
+    found = scene.plan(optimal=True).outcome
+    assert found.proved and (found.total, found.bound) == (4.0, 4.0)
+    assert found.plan is not None and found.plan.steps[0].arguments == ("box1", value)
