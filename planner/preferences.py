@@ -172,8 +172,10 @@ class _SoftGoalChoices:
 
     def excluded(self) -> bool:
         """Return whether a certificate proves that no choice has a plan; it may not depend on rest values of soft goals."""
-        certificate = self.outcome(Goals()).certificate
-        return certificate is not None and self.away.isdisjoint(fact.symbol for fact in certificate.unmet)
+        certificate, problem = self.outcome(Goals()).certificate, self.problem
+        hard = problem.goal.keys() - self.weights.keys()
+        rests = {fact.symbol for fact in certificate.unmet} - hard if certificate is not None else set[Symbol]()
+        return certificate is not None and not any(problem.concerns(goal, s) for goal in self.away for s in rests)
 
     def first(self) -> Goals | None:
         """Return the first choice for which a plan is found: without soft goals, or else any choice if a rest value matters."""

@@ -8,12 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from confab.reasoner.amounts import Amount, Expression, inside, situations_in
+from confab.reasoner.amounts import situations_in
 from confab.reasoner.closure import closure
 from confab.reasoner.language import groups
 from confab.reasoner.symbols import (
     FALSE,
-    Aggregate,
     AnyOf,
     ClassCondition,
     Comparison,
@@ -54,47 +53,6 @@ def needed(conditions: Sequence[Condition], negated: bool = False) -> Iterator[t
             case RelationCondition() | ClassCondition() | EqualityCondition() | Witness() | AnyOf():
                 for group in groups(condition):
                     yield from needed(group, flipped)
-
-
-def read_through(symbol: Symbol, domain: Domain) -> set[tuple[str, tuple[str, ...]]]:
-    """Return the situation types that the definition of a derived symbol reads, directly or by further definitions.
-
-    Each situation type has its terms: individuals, and classes in the place of variables. A stated symbol reads only itself.
-    """
-
-    def read(of: tuple[str, tuple[str, ...]]) -> Iterator[tuple[str, tuple[str, ...]]]:
-        total = domain.aggregates.get(of[0])
-        for one in (*domain.rules.get(of[0], ()), *((total,) if total else ())):
-            arguments = {p.name: term for p, term in zip(one.parameters, of[1], strict=True)}
-            kinds = {**{v.name: v.kind for v in one.variables}, **arguments}
-            yield from _symbols_in(one.conditions, kinds)
-            if isinstance(one, Aggregate):
-                yield from _amounts_in(one.amount, kinds)
-
-    return closure([(symbol.situation, symbol.arguments)], read)
-
-
-def _symbols_in(conditions: Sequence[Condition], kinds: Mapping[str, str]) -> Iterator[tuple[str, tuple[str, ...]]]:
-    for condition in conditions:
-        match condition:
-            case ValueCondition(situation, arguments):
-                yield situation, tuple(kinds.get(term, term) for term in arguments)
-            case Comparison(left, _, right):
-                yield from _amounts_in(left, kinds)
-                yield from _amounts_in(right, kinds)
-            case Witness(variable, kind, inner):
-                yield from _symbols_in(inner, {**kinds, variable: kind})
-            case AnyOf(alternatives):
-                for group in alternatives:
-                    yield from _symbols_in(group, kinds)
-            case RelationCondition() | ClassCondition() | EqualityCondition():
-                pass
-
-
-def _amounts_in(expression: Expression, kinds: Mapping[str, str]) -> Iterator[tuple[str, tuple[str, ...]]]:
-    for part in inside(expression):
-        if isinstance(part, Amount):
-            yield part.situation, tuple(kinds.get(term, term) for term in part.arguments)
 
 
 def strata(rules: Mapping[str, Sequence[Rule]]) -> list[tuple[str, ...]]:

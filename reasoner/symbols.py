@@ -18,7 +18,7 @@ quantified behaviour          ground action                              `Ground
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from fractions import Fraction
@@ -27,7 +27,7 @@ from itertools import product
 from math import prod
 from typing import Protocol, TypeAlias
 
-from confab.reasoner.amounts import OPERATIONS, Amount, Calculation, Expression, Quantity, put_in, situations_in
+from confab.reasoner.amounts import OPERATIONS, Amount, Calculation, Expression, Quantity, inside, put_in, situations_in
 from confab.reasoner.closure import closure
 from confab.reasoner.names import brief, known_as
 
@@ -656,8 +656,6 @@ class Problem:
     def _read_by(self, goal: Symbol) -> Mapping[str, set[tuple[str, ...]]]:
         if goal.situation not in self.domain.rules and goal.situation not in self.domain.aggregates:
             return {}
-        from confab.reasoner.derivation import read_through
-
         found: dict[str, set[tuple[str, ...]]] = {}
         for situation, terms in read_through(goal, self.domain):
             if self.domain.situations[situation].rest is not None:
@@ -744,6 +742,47 @@ class Problem:
     @cached_property
     def _ranks(self) -> Mapping[str, Mapping[str, int]]:
         return {kind: {member: i for i, member in enumerate(members)} for kind, members in self.classes.items()}
+
+
+def read_through(symbol: Symbol, domain: Domain) -> set[tuple[str, tuple[str, ...]]]:
+    """Return the situation types that the definition of a derived symbol reads, directly or by further definitions.
+
+    Each situation type has its terms: individuals, and classes in the place of variables. A stated symbol reads only itself.
+    """
+
+    def read(of: tuple[str, tuple[str, ...]]) -> Iterator[tuple[str, tuple[str, ...]]]:
+        total = domain.aggregates.get(of[0])
+        for one in (*domain.rules.get(of[0], ()), *((total,) if total else ())):
+            arguments = {p.name: term for p, term in zip(one.parameters, of[1], strict=True)}
+            kinds = {**{v.name: v.kind for v in one.variables}, **arguments}
+            yield from _symbols_in(one.conditions, kinds)
+            if isinstance(one, Aggregate):
+                yield from _amounts_in(one.amount, kinds)
+
+    return closure([(symbol.situation, symbol.arguments)], read)
+
+
+def _symbols_in(conditions: Sequence[Condition], kinds: Mapping[str, str]) -> Iterator[tuple[str, tuple[str, ...]]]:
+    for condition in conditions:
+        match condition:
+            case ValueCondition(situation, arguments):
+                yield situation, tuple(kinds.get(term, term) for term in arguments)
+            case Comparison(left, _, right):
+                yield from _amounts_in(left, kinds)
+                yield from _amounts_in(right, kinds)
+            case Witness(variable, kind, inner):
+                yield from _symbols_in(inner, {**kinds, variable: kind})
+            case AnyOf(alternatives):
+                for group in alternatives:
+                    yield from _symbols_in(group, kinds)
+            case RelationCondition() | ClassCondition() | EqualityCondition():
+                pass
+
+
+def _amounts_in(expression: Expression, kinds: Mapping[str, str]) -> Iterator[tuple[str, tuple[str, ...]]]:
+    for part in inside(expression):
+        if isinstance(part, Amount):
+            yield part.situation, tuple(kinds.get(term, term) for term in part.arguments)
 
 
 def substituted(condition: Condition, terms: Mapping[str, str]) -> Condition:
