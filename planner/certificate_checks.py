@@ -4,6 +4,7 @@ The checker examines only the lowest level of the task, because a failure of an 
 and conditions are evaluated by `confab.planner.possibilities`. The checker verifies three properties of the
 certificate's set of states. First, the set of states contains the initial state. Second, no behaviour of the lowest
 level leads out of the set of states; the checker expands each case of the certificate with all applicable behaviours.
+A sum or count that contradicts the other values of its case is replaced by its value according to its definition.
 Third, the set of states contains no final state. In a final state, the goal holds, and each symbol with a rest value
 has its rest value or its initial value. A final state violates no constraint, and all derived amounts are within their bounds.
 
@@ -21,6 +22,7 @@ from typing import Generic, TypeAlias, TypeVar
 from confab.planner.certificates import Certificate
 from confab.planner.checked_conditions import own_variables, undetermined, unified
 from confab.planner.possibilities import Beginning, FactEvaluation, Lowest, Range, WorkLimitError
+from confab.reasoner.aggregates.dependencies import in_order
 from confab.reasoner.amounts import bounds, number, written
 from confab.reasoner.symbols import FALSE, TRUE, Behavior, Fact, Problem, Symbol
 from confab.reasoner.timing import by_events
@@ -257,6 +259,12 @@ class Cases:
         self.reached: ClaimCase | None = None
         self.came_from: dict[ClaimCase, tuple[ClaimCase, Try | None]] = {}
         self._ends: Decisions[bool] = Decisions()
+        self._totals = [
+            (at, aggregate, symbol.arguments, Decisions[Range]())
+            for aggregate in in_order(self.problem.domain.aggregates)
+            for symbol, at in self.claims.places.items()
+            if symbol.situation == aggregate.situation and aggregate.kept
+        ]
         self._bounds: dict[Symbol, Range] = {}
 
     # ---------------------------------------------------------------------------------------------------- beginning
@@ -331,7 +339,22 @@ class Cases:
                 if entry != KEPT:
                     following[at] = entry
             self.lowest.spend()
-            yield tuple(following)
+            yield self._by_definition(tuple(following))
+
+    def _by_definition(self, case: ClaimCase) -> ClaimCase:
+        """Return a case in which each sum and count agrees with its definition, whatever the effects that update it say."""
+        for at, aggregate, arguments, known in self._totals:
+            if case[at] == ANY:
+                continue
+            found = known.find(case)
+            if found is None:
+                view = CaseView(self.claims, case)
+                found = FactEvaluation(self.lowest, view).total(aggregate, arguments)
+                known.learn(case, view.reads, found)
+            if not found.low <= number(case[at]) <= found.high:
+                exact = isinstance(found.low, Fraction) and found.low == found.high
+                case = (*case[:at], written(Fraction(found.low)) if exact else ANY, *case[at + 1 :])
+        return case
 
     def tries(self) -> Iterator[Try]:
         """Yield the behaviours, with individuals, that may change a distinguished value or violate a claim."""

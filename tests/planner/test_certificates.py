@@ -23,11 +23,13 @@ from confab.planner.plan import Limits, Outcome, Reason, Status
 from confab.planner.possibilities import Lowest
 from confab.planner.preferences import preferred
 from confab.planner.solve import MODES, Mode, Request, solve
+from confab.reasoner.aggregates.compiling import compiled
 from confab.reasoner.amounts import Amount, Calculation, Expression, Quantity
 from confab.reasoner.generate import write_scene
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
+    Aggregate,
     AmountEffect,
     Behavior,
     Comparison,
@@ -472,3 +474,22 @@ def test_the_exhaustive_search_and_the_certificate_agree_on_rest_values_that_are
         problem = world(kinds, behaviors, {"Cup": ("c",)}, stated, {"A c": TRUE})
         assert solvable(problem) is (back in behaviors)
         assert (certify(problem) is None) is (back in behaviors)
+
+
+@pytest.mark.parametrize(("counted", "proved"), [(1, False), (2, False), (3, True)])
+def test_a_certificate_rests_on_the_definition_of_a_count_and_not_on_the_effects_that_update_it(
+    counted: int, proved: bool
+) -> None:
+    lit = SituationType("LIT", ("Lamp",), "Truth", boolean=True)
+    many = SituationType("MANY", (), "", quantity=Quantity(least=Fraction(0)))
+    on = behavior("ON", 1, "?l:Lamp", [has("LIT", "?l", FALSE)], [becomes("LIT", "?l", TRUE)])
+    problem = world([lit, many], [on], {"Lamp": ("a", "b")}, {"MANY": "0"}, {"MANY": str(counted)})
+    lamps = Aggregate("MANY", "count", Fraction(1), (), (Parameter("?l", "Lamp"),), (has("LIT", "?l", TRUE),))
+    domain = compiled(replace(problem.domain, aggregates={"MANY": lamps}), problem.classes)
+    problem = replace(problem, domain=domain)
+    right = domain.behaviors["ON"]
+    for by in range(1, 5):  # if `by` isn't 1, the effect on the count is wrong
+        amounts = tuple(replace(effect, amount=Fraction(by)) for effect in right.amounts)
+        wrong = replace(domain, behaviors={"ON": replace(right, amounts=amounts)})
+        certificate = by_states(Lowest(replace(problem, domain=wrong)))
+        assert (certificate is not None) == proved
