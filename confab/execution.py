@@ -26,7 +26,7 @@ from confab.formats import EpisodeJson
 from confab.interchange import episode_json
 from confab.intervening import parse_interventions
 from confab.planner.acting.dispatching import Concurrency
-from confab.planner.acting.episode import End, Episode, Event, Intervention, InterventionKind, situation
+from confab.planner.acting.episode import End, Episode, Event, Intervention, InterventionKind, holds_from, situation
 from confab.planner.acting.executive import act
 from confab.planner.acting.failure_memory import Caution
 from confab.planner.acting.retries import RetryPolicy
@@ -45,7 +45,7 @@ from confab.reasoner.memory.links import Links
 from confab.reasoner.names import RightNames, right_names
 from confab.reasoner.possible import violated
 from confab.reasoner.reading.goals import some_of, with_goals
-from confab.reasoner.symbols import Fact, Problem, Symbol
+from confab.reasoner.symbols import Fact, Problem, Symbol, Times
 from confab.timing import has_times
 
 if TYPE_CHECKING:
@@ -114,6 +114,8 @@ class Execution(metaclass=RightNames):
         weighted = ((s, v) for s, v in problem.goal.items() if s in problem.weights and s not in dropped)
         soft = {s: v for s, v in weighted if episode.goal.get(s, v) == v}
         unmet = {fact.symbol for fact in open_goals(replace(problem, initial=episode.observed, goal=soft))}
+        deadlines = ((goal, by) for goal, by in (problem.times or Times()).deadlines.items() if goal in soft)
+        unmet |= {goal for goal, by in deadlines if holds_from(problem, goal, episode.initial, episode.course) > by}
         found = [SoftGoal(Fact(s, value), problem.weights[s], s not in unmet) for s, value in soft.items()]
         return tuple(sorted(found, key=lambda one: (-one.weight, one.fact.symbol)))
 

@@ -31,7 +31,7 @@ from confab.planner.plan_costs import cost_of
 from confab.planner.validation import unmet_goals
 from confab.reasoner.derivation import conditions_of_goal
 from confab.reasoner.limits import LimitError, OutOfTimeError, overtime
-from confab.reasoner.symbols import Fact, Problem, Symbol
+from confab.reasoner.symbols import Fact, Problem, Symbol, Times
 
 PlanSearch: TypeAlias = "Callable[[Problem], Outcome]"
 Shortener: TypeAlias = "Callable[[Problem, Outcome, bool], Outcome]"
@@ -145,7 +145,7 @@ class _SoftGoalChoices:
             self.outcomes[kept] = found
             if found.plan is not None:
                 self.outcomes.setdefault(
-                    self.met(found), found
+                    self.met(kept, found), found
                 )  # no search for goals that the plan meets without additional cost
             if found.certificate is not None and found.certificate.unmet:
                 unmet = frozenset((fact.symbol, fact.value) for fact in found.certificate.unmet)
@@ -301,19 +301,20 @@ class _SoftGoalChoices:
         `shorten` shortens the plan. `least` is a lower bound on the total cost of any choice.
         """
         longer: Outcome | None = outcome
+        kept = chosen
         while longer is not None:
             outcome, longer, more = longer, None, dict[Symbol, Fraction | None]()
-            kept = self.met(outcome)
+            kept = self.met(kept, outcome)
             for symbol in reversed(self.by_weight()):
                 if symbol not in kept:
                     other = self.extended(kept | {symbol}, outcome)
                     more[symbol] = None if other is None else self.price(other)
                     if other is not None and self.price(other) - self.price(outcome) < self.weights[symbol]:
-                        longer = other
+                        longer, kept = other, kept | {symbol}
                         break
         if shorten is not None:
             outcome = self.shorter(kept, outcome, shorten, briefly=False)
-            kept = self.met(outcome)
+            kept = self.met(kept, outcome)
         cost, forgone = self.price(outcome), []
         for symbol, longer_cost in more.items():
             if symbol in kept:
@@ -329,11 +330,12 @@ class _SoftGoalChoices:
         bound = None if least is None else float(min(least, cost + penalty))
         return self.task(kept), replace(outcome, forgone=tuple(forgone), penalty=penalty, bound=bound)
 
-    def met(self, found: Outcome) -> Goals:
-        """Return the soft goals that the plan of an outcome meets."""
+    def met(self, kept: Goals, found: Outcome) -> Goals:
+        """Return the soft goals that the plan of the outcome for a choice meets; without the choice, no goal with a deadline."""
         assert found.plan is not None
+        late = (self.problem.times or Times()).deadlines.keys() - kept
         with overtime():
-            return Goals(self.weights.keys() - unmet_goals(self.problem, found.plan))
+            return Goals(self.weights.keys() - unmet_goals(self.problem, found.plan) - late)
 
     def why(self, other: Goals) -> str:
         """Return why a choice has no plan: there is none, a limit ended the search, or the search found none."""

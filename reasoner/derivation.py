@@ -19,6 +19,8 @@ from confab.reasoner.symbols import (
     Condition,
     Domain,
     EqualityCondition,
+    Fact,
+    Problem,
     RelationCondition,
     Rule,
     Symbol,
@@ -34,6 +36,24 @@ def conditions_of_goal(domain: Domain, symbol: Symbol) -> tuple[Condition, ...]:
     """Return the conditions of a goal with alternatives or quantifiers; the tuple is empty if the symbol isn't such a goal."""
     kind, rules = domain.situations.get(symbol.situation), domain.rules.get(symbol.situation, ())
     return rules[0].conditions if kind is not None and kind.arguments == (TASK,) and len(rules) == 1 else ()
+
+
+def deciding(problem: Problem, goal: Symbol) -> ValueCondition:
+    """Return the condition on one symbol that decides whether a goal with a deadline holds."""
+    match conditions_of_goal(problem.domain, goal):
+        case (ValueCondition() as wanted,):
+            return wanted
+        case _:
+            return ValueCondition(goal.situation, goal.arguments, problem.goal[goal])
+
+
+def said_by(problem: Problem, goal: Symbol) -> str:
+    """Return a goal with a deadline as text.
+
+    The text is the fact that decides whether the goal holds, after *not* if the fact must not hold.
+    """
+    wanted = deciding(problem, goal)
+    return f"{'not ' * wanted.negated}{Fact(Symbol(wanted.situation, wanted.arguments), wanted.value)}"
 
 
 def needed(conditions: Sequence[Condition], negated: bool = False) -> Iterator[tuple[str, bool]]:

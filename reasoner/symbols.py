@@ -610,8 +610,16 @@ class Problem:
 
     def only(self, unmet: Collection[Symbol]) -> Problem:
         """Return the problem without the soft goals `unmet`; all other goals must be met."""
-        goal = {symbol: value for symbol, value in self.goal.items() if symbol not in unmet}
-        return replace(self, goal=goal, weights={})
+        return replace(self.without_goals(unmet), weights={})
+
+    def without_goals(self, dropped: Collection[Symbol]) -> Problem:
+        """Return the problem without the goals for some symbols, their weights and their deadlines."""
+        goal = {symbol: value for symbol, value in self.goal.items() if symbol not in dropped}
+        weights = {symbol: weight for symbol, weight in self.weights.items() if symbol not in dropped}
+        known = self.times.deadlines if self.times is not None else {}
+        by = {symbol: seconds for symbol, seconds in known.items() if symbol not in dropped}
+        times = replace(self.times, deadlines=by) if self.times is not None else None
+        return replace(self, goal=goal, weights=weights, times=times)
 
     def values(self, symbol: Symbol, level: int) -> tuple[str, ...]:
         """Return the values that a symbol can have on a level, in declared order."""

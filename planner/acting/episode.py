@@ -9,9 +9,11 @@ from enum import Enum
 
 from confab.planner.acting.discovery import Discovery
 from confab.planner.plan import Plan, Reason, Step
+from confab.reasoner.amounts import meets
+from confab.reasoner.derivation import deciding
 from confab.reasoner.names import brief, known_as
 from confab.reasoner.refutations import Refutation
-from confab.reasoner.symbols import Fact, Problem, State, Symbol
+from confab.reasoner.symbols import FALSE, Fact, Problem, State, Symbol
 
 
 class InterventionKind(Enum):
@@ -103,6 +105,17 @@ def changes(before: State, after: State, seconds: float) -> list[BeliefChange]:
 def changed(values: State, seconds: float) -> list[BeliefChange]:
     """Return the changes of symbols to new values at a time."""
     return [BeliefChange(seconds, symbol, value) for symbol, value in values.items()]
+
+
+def holds_from(problem: Problem, goal: Symbol, initial: State, course: Iterable[BeliefChange]) -> float:
+    """Return the time from which a goal with a deadline holds, if it holds in the end."""
+    wanted, seconds = deciding(problem, goal), 0.0
+    symbol = Symbol(wanted.situation, wanted.arguments)
+    met = meets(initial.get(symbol, FALSE), wanted.value)
+    for change in course:
+        if change.symbol == symbol and meets(change.value or FALSE, wanted.value) is not met:
+            met, seconds = not met, change.seconds
+    return seconds
 
 
 def situation(initial: State, course: Iterable[BeliefChange], seconds: float = math.inf) -> dict[Symbol, str]:

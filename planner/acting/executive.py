@@ -34,6 +34,7 @@ from confab.planner.acting.episode import (
     Replan,
     Surprise,
     changed,
+    holds_from,
 )
 from confab.planner.acting.failure_memory import Caution, refuted_by, relied_on_by
 from confab.planner.acting.record import Record
@@ -45,6 +46,7 @@ from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, renumbered
 from confab.planner.timed.activities import InapplicableError, StepSimulation
 from confab.planner.validation import followed, open_goals
+from confab.reasoner.derivation import said_by
 from confab.reasoner.limits import LimitError, check, current
 from confab.reasoner.refutations import Refutation
 from confab.reasoner.symbols import FALSE, Fact, Problem, State, Symbol, Times
@@ -182,13 +184,17 @@ class _RunningEpisode:
 
     def missed_times(self) -> Iterator[Reason]:
         """Yield a reason for each goal that was reached after its deadline, and for each step outside of a window or fixed time."""
-        times = self.belief.problem.times or Times()
+        problem = self.belief.problem
+        times = problem.times or Times()
         for goal, by in times.deadlines.items():
-            reached = max((change.seconds for change in self.record.course if change.symbol == goal), default=0.0)
-            if goal in self.belief.goal and reached > by:
+            if (
+                goal in problem.goal
+                and (reached := holds_from(problem, goal, self.record.initial, self.record.course)) > by
+            ):
                 known = f"; this was known at {float(self.late[goal]):g} s" if goal in self.late else ""
-                fact = Fact(goal, self.belief.goal[goal])
-                yield Reason(f"{fact} is a goal by {float(by):g} s, and holds from {reached:g} s on{known}")
+                yield Reason(
+                    f"{said_by(problem, goal)} is a goal by {float(by):g} s, and holds from {reached:g} s on{known}"
+                )
         for event in self.record.events:
             took = f"{event.step} took from {event.begin:g} to {event.end:g} s"
             for one in event.step.arguments:

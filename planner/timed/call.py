@@ -29,8 +29,9 @@ from confab.planner.timed.schedules import (
 )
 from confab.planner.timed.validation import validate_timed
 from confab.planner.validation import validate
+from confab.reasoner.derivation import said_by
 from confab.reasoner.limits import LimitError, check, overtime, within
-from confab.reasoner.symbols import Fact, Problem, Times
+from confab.reasoner.symbols import Problem, Times
 from confab.reasoner.timing import judged_by_events
 
 KEPT = 0.25
@@ -233,7 +234,7 @@ def _late(
             missed.append(f"{individual} is available only {' and '.join(map(_written, windows))}")
     for symbol, (changing, which, by) in order.latest.items():
         if changing == i and (end if which == END else begin) > by:
-            missed.append(f"{Fact(symbol, problem.goal[symbol])} is a goal by {float(by):g} s")
+            missed.append(f"{said_by(problem, symbol)} is a goal by {float(by):g} s")
     if one.at is not None and begin > one.at:
         missed.append(f"it happens at {float(one.at):g} s")
     return Reason(

@@ -24,8 +24,10 @@ from confab.planner.timed.activities import Activity, EventKind, InapplicableErr
 from confab.planner.timed.activities import activities as simulated
 from confab.planner.timed.pools import AmountPool, AmountUse, pool_of
 from confab.planner.validation import Cell
+from confab.reasoner.amounts import meets
+from confab.reasoner.derivation import deciding
 from confab.reasoner.limits import check
-from confab.reasoner.symbols import Problem, Symbol, Times
+from confab.reasoner.symbols import Problem, Symbol, Times, ValueCondition
 
 BEGIN, END = 0, 1
 Edge = tuple[int, int, int, int]
@@ -118,7 +120,7 @@ def order_of(problem: Problem, activities: Sequence[Activity], events: Iterable[
     pools = _pools(problem, activities, events)
     records, touched, starts, ends = _records(activities, events, pools)
     times = problem.times or Times()
-    fixed = {(s.situation, s.arguments) for s in times.deadlines}
+    fixed = {(one.situation, one.arguments) for one in _deciding(problem).values()}
     returning = {cell for cell in records if cell not in fixed and _returns(records[cell])}
     actors = dict.fromkeys(actor for one in activities for actor in one.actors)
     owned = {actor: [c for c in returning if actor in c[1] and _sole(c, actors)] for actor in actors}
@@ -178,7 +180,7 @@ def _pools(problem: Problem, activities: Sequence[Activity], events: Sequence[St
         for access, which, other in ((one.begin, BEGIN, EventKind.END), (one.end, END, EventKind.BEGIN)):
             for cell, count in access.counts.items() if moment is not other else ():
                 found[cell].append((number, which, count))
-    unfit: set[ReadAccess] = {(symbol.situation, symbol.arguments) for symbol in (problem.times or Times()).deadlines}
+    unfit: set[ReadAccess] = {(one.situation, one.arguments) for one in _deciding(problem).values()}
     for access in (access for one in activities if found for access in one.accesses):
         unfit |= (access.reads | access.changes.keys()) - access.counts.keys()
     pools = dict[Cell, Resource]()
@@ -361,14 +363,19 @@ def _touching(
 def _latest(
     problem: Problem, times: Times, records: Mapping[Cell, Sequence[_TimedAccess]]
 ) -> dict[Symbol, tuple[int, int, Fraction]]:
-    """Return the last change of each goal with a deadline, and the deadline."""
+    """Return the last change that decides whether a goal with a deadline holds, and the deadline, for each such goal."""
     found = {}
-    for symbol, seconds in times.deadlines.items():
-        its = records.get((symbol.situation, symbol.arguments), ())
-        changing = [(r.activity, r.high) for r in its if r.written is not None and r.written[0] != r.written[1]]
-        if symbol in problem.goal and changing:
-            found[symbol] = (*changing[-1], seconds)
+    for goal, wanted in _deciding(problem).items():
+        for record in records.get((wanted.situation, wanted.arguments), ()):
+            if record.written is not None and len({meets(value, wanted.value) for value in record.written}) > 1:
+                found[goal] = record.activity, record.high, times.deadlines[goal]
     return found
+
+
+def _deciding(problem: Problem) -> dict[Symbol, ValueCondition]:
+    """Return the condition that decides whether a goal with a deadline holds, for each such goal."""
+    deadlines = problem.times.deadlines if problem.times is not None else ()
+    return {goal: deciding(problem, goal) for goal in deadlines if goal in problem.goal}
 
 
 def _windows(times: Times, activities: Sequence[Activity]) -> dict[int, tuple[tuple[Fraction, Fraction | None], ...]]:

@@ -145,7 +145,7 @@ class _TimedExecution:
         self.made: dict[int, dict[Cell, str]] = {}
         self.last: dict[Cell, int] = {}
         self.since: dict[Cell, Fraction] = {}  # time at which a step last set a symbol
-        self.changed: dict[Cell, Fraction] = {}  # time at which the value of a symbol last changed
+        self.met: dict[Symbol, Fraction] = {}  # time from which a goal with a deadline holds
         self.asked: dict[Cell, Fraction] = {}  # time at which a step last read a symbol
         self.read_by: dict[Cell, int] = {}
 
@@ -158,12 +158,14 @@ class _TimedExecution:
             [(s.begin, 1, n, 0) for n, s in enumerate(slots)]
             + [(s.end, 1 if s.begin == s.end else 0, n, 1) for n, s in enumerate(slots)]
         )
+        self.look(Fraction(0))
         for time, _, number, which in events:
             check("checking the plan in time")
             faults = list(self.ended(number, time) if which else self.begun(number, slots[number], time))
             yield from faults
             if faults:
                 return
+            self.look(time)
             broken = [f for one in self.running.values() if one.number != number for f in self.holds(one)]
             if self.sequence is None and (found := violation(self.rules, self.facts, self.exceptions)) is not None:
                 broken.append(Fault(slots[number].step.path, f"{slots[number].step}: {found}"))
@@ -256,12 +258,23 @@ class _TimedExecution:
 
     def put(self, one: _Running, cell: Cell, value: str, time: Fraction) -> None:
         """Set the value of a symbol, and record the step and the time."""
-        if LoggedState.value(self.facts, *cell) != value:
-            self.changed[cell] = time
         self.facts.put(*cell, value)
         self.made[one.number][cell] = value
         self.last[cell] = one.number
         self.since[cell] = time
+
+    def look(self, time: Fraction) -> None:
+        """Record from which time on each goal with a deadline holds."""
+        for goal in self.times.deadlines:
+            if goal in self.problem.goal:
+                if not meets(self.value_of(goal), self.problem.goal[goal]):
+                    self.met.pop(goal, None)
+                else:
+                    self.met.setdefault(goal, time)
+
+    def value_of(self, goal: Symbol) -> str:
+        self.facts.clear()
+        return self.facts.value(goal.situation, goal.arguments) or FALSE
 
     def foreign(self, one: _Running, changed: Sequence[Cell], time: Fraction) -> Iterator[Fault]:
         """Yield a fault if a step conflicts with another step.
@@ -308,12 +321,11 @@ class _TimedExecution:
         sequential plan, yield a fault for each changed symbol that has neither its rest value nor its initial value.
         """
         for symbol, wanted in self.problem.goal.items():
-            got = self.facts.value(symbol.situation, symbol.arguments) or FALSE
+            got = self.value_of(symbol)
             if not meets(got, wanted):
                 yield Fault((), f"the goal {symbol} = {wanted} isn't reached: it is {got} in the end")
-            latest = self.times.deadlines.get(symbol)
-            since = self.changed.get((symbol.situation, symbol.arguments), Fraction(0))
-            if latest is not None and since > latest:
+            latest, since = self.times.deadlines.get(symbol), self.met.get(symbol)
+            if latest is not None and since is not None and since > latest:
                 yield Fault((), f"the goal {symbol} = {wanted} is reached at {since} s; it has to be by {latest} s")
         if self.sequence is not None:
             for cell, number in sorted(self.sequence[1].items()):

@@ -10,6 +10,7 @@ from itertools import chain
 
 from confab.reasoner.aggregates.extrema import with_extrema
 from confab.reasoner.amounts import DECIMAL, Amount, bounds_written, written
+from confab.reasoner.closure import closure
 from confab.reasoner.derivation import TASK, needed
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.language import is_variable, terms, walk
@@ -28,6 +29,7 @@ from confab.reasoner.symbols import (
     Rule,
     SituationType,
     Symbol,
+    Times,
     ValueCondition,
     Witness,
     substituted,
@@ -55,8 +57,8 @@ def with_goals(problem: Problem, goals: Iterable[str]) -> Problem:
             )
         if given.setdefault(symbol, value) != value:
             raise KnowledgeError(f"there are two goals for {symbol}: {given[symbol]} and {value}; give only one")
-    weights = {symbol: weight for symbol, weight in problem.weights.items() if symbol not in given}
-    return replace(problem, goal=dict(sorted({**problem.goal, **given}.items())), weights=weights)
+    others = problem.without_goals(given)
+    return replace(others, goal=dict(sorted({**others.goal, **given}.items())))
 
 
 def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
@@ -157,19 +159,26 @@ def with_task(problem: Problem, parts: Parts, tasks: Iterable[str]) -> Problem:
     Raises
     ------
     KnowledgeError
-        Two goals contradict each other, or a goal mentions an individual that isn't in the scene.
+        Two goals contradict each other, a goal mentions an individual that isn't in the scene, or a goal with a deadline isn't the
+        value of one symbol that behaviours can change.
     """
-    goal, weights = dict[Symbol, str](), dict[Symbol, Fraction]()
+    goal, weights, deadlines = dict[Symbol, str](), dict[Symbol, Fraction](), dict[Symbol, Fraction]()
     found = [(task, iri, _weight(parts, iri)) for task in tasks for iri in parts.values(task, "goal")]
     found.sort(key=lambda one: one[2] is not None)  # hard goals first
-    for task, iri, weight, wanted in (
+    for task, iri, weight, (wanted, by) in (
         (*one, wanted) for one in found for wanted in _wanted(parts, one[1], problem.classes)
     ):
+        if by is not None and not (isinstance(wanted, ValueCondition) and wanted.situation not in problem.domain.rules):
+            raise KnowledgeError(
+                f"<{iri}> has a deadline (:by), which only the value of one symbol can have that behaviours change; "
+                "name an individual and a situation type without rules"
+            )
         taken = weight is not None and _symbol_of(wanted) in goal  # the goal counts by itself
         if taken or not _is_fact(wanted, problem):
             problem, symbol = with_derived_goal(problem, parts.names.short(task), parts.names.short(iri), wanted)
             goal[symbol] = TRUE
             weights |= {} if weight is None else {symbol: weight}
+            deadlines |= {} if by is None else {symbol: by}
             continue
         if isinstance(wanted, Comparison):
             symbol, value = _bounds(iri, wanted)
@@ -190,13 +199,15 @@ def with_task(problem: Problem, parts: Parts, tasks: Iterable[str]) -> Problem:
         if value == FALSE and not all(a in its for a, its in zip(symbol.arguments, members, strict=True)):
             continue  # the symbol doesn't exist
         weights |= {} if weight is None else {symbol: weight}
+        deadlines |= {} if by is None else {symbol: min(by, deadlines.get(symbol, by))}
         if goal.setdefault(symbol, value) != value:
             raise KnowledgeError(
                 f"two goals require that {symbol} is {goal[symbol]} and {value}; drop one of the goals"
             )
         if symbol not in problem.initial and not problem.domain.situations[symbol.situation].boolean:
             raise KnowledgeError(f"<{iri}>: there is no {symbol}; the object or its situation type isn't in the scene")
-    return replace(problem, goal=dict(sorted(goal.items())), weights=weights)
+    times = Times(deadlines) if deadlines else None
+    return replace(problem, goal=dict(sorted(goal.items())), weights=weights, times=times)
 
 
 def symbols_of(problem: Problem, parts: Parts, task: str, iri: str) -> set[Symbol]:
@@ -209,7 +220,7 @@ def symbols_of(problem: Problem, parts: Parts, task: str, iri: str) -> set[Symbo
     }
     if derived and _weight(parts, iri) is not None:
         return derived
-    facts = [_symbol_of(wanted) for wanted in _wanted(parts, iri, problem.classes) if _is_fact(wanted, problem)]
+    facts = [_symbol_of(wanted) for wanted, _ in _wanted(parts, iri, problem.classes) if _is_fact(wanted, problem)]
     return derived | problem.goal.keys() & facts
 
 
@@ -276,18 +287,23 @@ def _other_values(excluded: ValueCondition, problem: Problem) -> list[str]:
     return [value for value in values if value != excluded.value]
 
 
-def _wanted(parts: Parts, iri: str, classes: Mapping[str, tuple[str, ...]]) -> list[Condition]:
-    """Return the goals that a goal node denotes.
+def _wanted(
+    parts: Parts, iri: str, classes: Mapping[str, tuple[str, ...]], by: Fraction | None = None
+) -> list[tuple[Condition, Fraction | None]]:
+    """Return the goals that a goal node denotes, each with its deadline, which is `by` at the latest.
 
     If an argument of the node is a class, there is one goal for each member of the class. A hard conjunction denotes its conjuncts.
     """
     found = parts.condition(iri)
     of_several = iri in parts.nodes and is_a(parts.nodes[iri], "AllOf") and not parts.flag(iri, "negated")
     if of_several and not parts.values(iri, "weight"):
-        each = parts.values(iri, "condition")
-        return list(parts.in_order(one for conjunct in each for one in _wanted(parts, conjunct, classes)))
+        each, by = parts.values(iri, "condition"), _earliest(parts, [iri], by)
+        return list(parts.in_order(one for conjunct in each for one in _wanted(parts, conjunct, classes, by)))
+    by = _earliest(
+        parts, closure([iri], lambda one: (*parts.values(one, "condition"), *parts.values(one, "alternative"))), by
+    )
     if not (isinstance(found, Witness) and parts.classes_in(iri)):
-        return [found]
+        return [(found, by)]
     wanted: list[Condition] = [found]
     while isinstance(found, Witness):
         *others, _ = found.conditions
@@ -303,7 +319,13 @@ def _wanted(parts: Parts, iri: str, classes: Mapping[str, tuple[str, ...]]) -> l
             for member in classes.get(one.kind, ())
         ]
         found = found.conditions[-1]
-    return [replace(one, negated=not one.negated) for one in wanted]
+    return [(replace(one, negated=not one.negated), by) for one in wanted]
+
+
+def _earliest(parts: Parts, nodes: Iterable[str], by: Fraction | None) -> Fraction | None:
+    """Return the earliest of the deadlines of nodes and the deadline `by`."""
+    every = (by, *(parts.seconds(node, "by") for node in nodes))
+    return min((one for one in every if one is not None), default=None)
 
 
 def _bounds(iri: str, wanted: Comparison) -> tuple[Symbol, str]:

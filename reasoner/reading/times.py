@@ -1,4 +1,4 @@
-"""The times that a scene states: deadlines of goals, time windows of individuals, and behaviours at fixed times."""
+"""The times that a scene states beside the deadlines of goals: time windows of individuals, and behaviours at fixed times."""
 
 from __future__ import annotations
 
@@ -10,42 +10,22 @@ from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.names import local_name
 from confab.reasoner.reading.parts import Parts
 from confab.reasoner.reading.rows import OntologySchema
-from confab.reasoner.symbols import Problem, Symbol, Times, ValueCondition
+from confab.reasoner.symbols import Problem, Times
 
 
 def with_times(problem: Problem, parts: Parts, schema: OntologySchema) -> Problem:
-    """Return a problem with the times that its scene states; return the problem itself if the scene states no times.
+    """Return a problem with the time windows and the fixed times that its scene states, or the problem itself without them.
 
     Raises
     ------
     KnowledgeError
-        A goal with a deadline isn't a fact that behaviours can change, or a time window is empty.
+        A time window is empty, or a behaviour at a fixed time has parameters.
     """
-    times = Times(deadlines(problem, parts, schema), windows(problem, parts, schema), {}, happenings(parts, schema))
-    return replace(problem, times=times) if times != Times() else problem
+    known, windows, events = problem.times or Times(), windows_of(problem, parts, schema), happenings(parts, schema)
+    return replace(problem, times=replace(known, windows=windows, events=events)) if windows or events else problem
 
 
-def deadlines(problem: Problem, parts: Parts, schema: OntologySchema) -> dict[Symbol, Fraction]:
-    """Return the deadline in seconds of each goal that has a deadline."""
-    found: dict[Symbol, Fraction] = {}
-    for task in schema.of_kind("Task"):
-        for iri in parts.values(task, "goal"):
-            by = parts.seconds(iri, "by")
-            if by is None:
-                continue
-            wanted = parts.condition(iri)
-            if not isinstance(wanted, ValueCondition) or wanted.situation in problem.domain.rules:
-                raise KnowledgeError(
-                    f"<{iri}> has a deadline (:by), which only the value of one symbol can have that behaviours change; "
-                    "name an individual and a situation type without rules"
-                )
-            symbol = Symbol(wanted.situation, wanted.arguments)
-            if symbol in problem.goal:
-                found[symbol] = min(by, found.get(symbol, by))
-    return found
-
-
-def windows(
+def windows_of(
     problem: Problem, parts: Parts, schema: OntologySchema
 ) -> dict[str, tuple[tuple[Fraction, Fraction | None], ...]]:
     """Return the time windows, in seconds, in which individuals are available."""

@@ -369,3 +369,97 @@ def test_an_export_says_that_pddl_has_no_times(tmp_path: Path) -> None:
     assert "the PDDL has no durations, deadlines or windows of availability" in done.stderr
     done = CliRunner().invoke(app, ["export", "house-small", "-o", str(tmp_path / "house")])
     assert done.stderr == ""
+
+
+CUPS = """
+@prefix : <https://example.org/cups#> .
+@prefix c: <https://w3id.org/confab/core#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+@prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
+<https://example.org/cups> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> ; c:symbolicOnly true .
+:Cup a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object ; c:hasSituationType :AT .
+:AT a owl:Class, owl:NamedIndividual, c:SituationType ; c:valueProperty :at .
+:at a owl:ObjectProperty, owl:FunctionalProperty, owl:NamedIndividual ; rdfs:domain :Cup ; rdfs:range :AT .
+:beside a owl:ObjectProperty, owl:NamedIndividual, c:Relation ; rdfs:domain :AT ; rdfs:range :AT .
+:table a owl:NamedIndividual, :AT ; :beside :shelf . :shelf a owl:NamedIndividual, :AT ; :beside :sink, :table .
+:sink a owl:NamedIndividual, :AT ; :beside :shelf .
+:cup a owl:NamedIndividual, :Cup ; :at :table .
+[] a owl:AllDifferent ; owl:distinctMembers ( :table :shelf :sink :cup ) .
+:MOVE a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 1 ; c:duration "PT5S"^^xsd:dayTimeDuration ; c:update '''
+  DELETE { ?cup :at ?from } INSERT { ?cup :at ?to }
+  WHERE { ?cup a :Cup . ?from a :AT . ?to a :AT . ?from :beside ?to . ?cup :at ?from }''' .
+"""
+"""A cup that takes 5 s from the table to the shelf, and 10 s to the sink."""
+
+
+def cups(folder: Path, *goals: str, nodes: str = "") -> confab.Scene:
+    """Return a scene with goals about the cup, such as ``:value :shelf``; `nodes` are the nodes that the goals name."""
+    said = [f"[] c:about :cup ; c:situationType :AT ; {goal} ." for goal in goals]
+    named = [f":g{n} a owl:NamedIndividual, c:ValueCondition ;{one[2:]}" for n, one in enumerate(said)]
+    task = ":task a owl:NamedIndividual, c:Task ; c:goal "
+    wanted = ", ".join(f":g{n}" for n in range(len(goals)) if not nodes) or ":all"
+    (folder / "cups.ttl").write_text("\n".join([CUPS, task + wanted + " .", *named, nodes]), "utf-8")
+    return confab.load(folder / "cups.ttl")
+
+
+def by(seconds: int) -> str:
+    return f'c:by "PT{seconds}S"^^xsd:dayTimeDuration'
+
+
+SOFT_ALL = ":all a owl:NamedIndividual, c:AllOf ; c:weight 2.0 ; c:condition :g0, :g1 ."
+HARD_ALL = ":all a owl:NamedIndividual, c:AllOf ; c:condition :g0, :g1 ."
+AWAY = "c:value :table ; c:negated true"
+
+
+def test_a_value_that_must_be_left_by_a_deadline_is_left_by_then_whatever_follows(tmp_path: Path) -> None:
+    scene = cups(tmp_path, f"{AWAY} ; {by(5)}", "c:value :sink")
+    result = scene.plan()
+    assert result.timed is not None
+    assert [slot.end for slot in result.timed.slots] == [5, 10]
+    assert not result.execute().episode.reasons
+
+
+def test_a_value_that_cannot_be_left_by_its_deadline_is_named_as_unwanted(tmp_path: Path) -> None:
+    assert "not cup AT table is a goal by 4 s" in said(cups(tmp_path, f"{AWAY} ; {by(4)}").plan())
+
+
+def test_a_part_of_a_conjunction_keeps_its_own_deadline(tmp_path: Path) -> None:
+    goals = f"c:value :sink ; {by(9)}", AWAY
+    assert "cup AT sink is a goal by 9 s" in said(cups(tmp_path, *goals, nodes=HARD_ALL).plan())
+
+
+def test_the_deadline_of_a_conjunction_is_the_deadline_of_each_part(tmp_path: Path) -> None:
+    goals, nodes = (f"c:value :sink ; {by(20)}", AWAY), HARD_ALL.replace(" .", f" ; {by(9)} .")
+    assert "cup AT sink is a goal by 9 s" in said(cups(tmp_path, *goals, nodes=nodes).plan())
+
+
+@pytest.mark.parametrize("nodes", [SOFT_ALL, SOFT_ALL.replace("c:weight 2.0 ; ", "c:negated true ; ")])
+def test_a_deadline_inside_a_goal_that_is_no_conjunction_of_values_is_refused(tmp_path: Path, nodes: str) -> None:
+    with pytest.raises(confab.KnowledgeError, match="has a deadline"):
+        cups(tmp_path, f"c:value :sink ; {by(20)}", AWAY, nodes=nodes).plan()
+
+
+def test_two_soft_goals_about_one_symbol_keep_their_own_deadlines(tmp_path: Path) -> None:
+    result = cups(
+        tmp_path, f"c:value :sink ; c:weight 9.0 ; {by(20)}", f"c:value :shelf ; c:weight 3.0 ; {by(1)}"
+    ).plan()
+    assert [goal.met for goal in result.soft_goals] == [True, False]
+    assert result.plan.primitives[-1].arguments[0] == "cup"
+
+
+def test_the_deadline_of_a_soft_goal_is_no_deadline_of_a_hard_goal_about_the_same_symbol(tmp_path: Path) -> None:
+    result = cups(tmp_path, "c:value :sink", f"c:value :shelf ; c:weight 3.0 ; {by(1)}").plan()
+    assert result.solved
+    assert [goal.met for goal in result.soft_goals] == [False]
+
+
+@pytest.mark.parametrize(("seconds", "met"), [(9, False), (10, True)])
+def test_a_soft_goal_that_is_reached_after_its_deadline_is_unmet(tmp_path: Path, seconds: int, met: bool) -> None:
+    result = cups(tmp_path, "c:value :sink", f"c:value :sink ; c:weight 3.0 ; {by(seconds)}").plan()
+    assert [goal.met for goal in result.soft_goals] == [met]
+    assert [goal.met for goal in result.execute().soft_goals] == [met]
+
+
+def test_a_goal_of_a_call_has_no_deadline_from_the_goal_that_it_replaces(tmp_path: Path) -> None:
+    assert cups(tmp_path, f"c:value :shelf ; {by(1)}").plan("cup AT sink").solved
