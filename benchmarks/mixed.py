@@ -30,10 +30,18 @@ from worlds.scenes import scene
 from worlds.shrinking import shrunk
 
 FIRST, COUNT, STRETCH = 1_000_000, 1_000, 250
-SHARES = {"constrained": 0.3, "mutual": 0.2, "priced": 0.2, "everyone": 0.1, "repeated": 0.2, "nested": 0.1}
+SHARES = {
+    "constrained": 0.3,
+    "mutual": 0.2,
+    "priced": 0.2,
+    "everyone": 0.1,
+    "repeated": 0.2,
+    "nested": 0.1,
+    "negated": 0.15,
+}
 """Shares of worlds with a constraint on every state, with situation types that define each other, with costs that depend on
-amounts, with a goal about all individuals of a class, with behaviours that change a situation type by several effects, and with
-totals of totals."""
+amounts, with a goal about all individuals of a class, with behaviours that change a situation type by several effects, with
+totals of totals, and with goals that exclude a value or an amount."""
 SHRUNK = 2
 """Number of worlds that each process shrinks for each kind of fault."""
 SHOWN, MUTANTS = 6, 100

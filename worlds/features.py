@@ -7,6 +7,7 @@ from dataclasses import replace
 from itertools import combinations
 
 from confab.reasoner.amounts import Calculation, Expression, inside
+from confab.reasoner.derivation import TASK
 from confab.reasoner.symbols import (
     FALSE,
     AmountEffect,
@@ -181,6 +182,9 @@ FEATURES: Mapping[str, Callable[[RandomWorld], Problem]] = {
     "transitive properties and chains": _without_rules(lambda world, name: name in world.axioms),
     "negated goals": _without_goals(lambda world, name, value: value == FALSE),
     "negated goals on several values": _without_goals(lambda world, name, v: v == FALSE and name in world.pairs),
+    "goals that exclude one of several values": _without_goals(
+        lambda world, name, _: world.problem.domain.situations[name].arguments == (TASK,) and _negative(world, name)
+    ),
     "rest values": _restless,
     "equal arguments": _different,
     "individuals that nothing names": _named_only,

@@ -21,6 +21,7 @@ from confab.reasoner.aggregates.dependencies import read_by
 from confab.reasoner.amounts import Amount, Expression, Quantity, bounds, written
 from confab.reasoner.closure import closure
 from confab.reasoner.derivation import TASK, circular
+from confab.reasoner.language import terms, walk
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -101,17 +102,18 @@ def drawn(
     everyone: float = 0.0,
     repeated: float = 0.0,
     nested: float = 0.0,
+    negated: float = 0.0,
 ) -> tuple[RandomWorld, Interpreter]:
     """Return the random world of a seed, and an interpreter of the world.
 
     Parameters
     ----------
     seed : int
-    aggregated, constrained, remembered, mutual, priced, everyone, repeated, nested : float
+    aggregated, constrained, remembered, mutual, priced, everyone, repeated, nested, negated : float
         The shares of worlds with derived amounts, with constraints on every state, with remembered situation types, with two
         situation types that define each other, with behaviours whose costs depend on amounts, with a goal about all individuals
-        of a class, with behaviours that change a situation type by several effects, and with bounds or constraints on totals of
-        totals.
+        of a class, with behaviours that change a situation type by several effects, with bounds or constraints on totals of
+        totals, and with goals that exclude a value or an amount.
     """
     rng = Random(f"mixed {seed}")
     most, least = (MOST, FEW if rng.random() < 0.5 else 2) if rng.random() > UNBOUNDED else (MOST // 10, 0)
@@ -131,7 +133,7 @@ def drawn(
         goal = _Wishes(rng, interpreter, {node[0]: cost for node, cost in costs.items()}).goal(rng.random() < EXCLUDED)
         if goal:
             meant = _of_everyone(seed, interpreter.wanting(goal), everyone)
-            return _with_derived_goal(replace(world, problem=meant.problem), meant)
+            return _with_excluded(*_with_derived_goal(replace(world, problem=meant.problem), meant), negated)
 
 
 def crowded(seed: int, constrained: float = 0.0) -> tuple[RandomWorld, Interpreter, list[State]]:
@@ -188,17 +190,57 @@ def _with_derived_goal(world: RandomWorld, meant: Interpreter) -> tuple[RandomWo
     if "|" not in kind.arguments[0] and (not others or rng.random() < 0.4):
         some = Symbol(symbol.situation, ("?w", *symbol.arguments[1:]))
         wanted = Witness("?w", kind.arguments[0], _as_conditions(problem, some, value))
-    rule = Rule("goal0", (Parameter("?task", TASK),), (), (wanted,))
-    level = max(domain.situations[s].level for s in named([wanted]))
-    derived = SituationType("goal0", (TASK,), "Truth", level, boolean=True, default=FALSE)
-    more = replace(domain, situations={**domain.situations, "goal0": derived}, rules={**domain.rules, "goal0": (rule,)})
     left = dict(list(problem.goal.items())[2 if isinstance(wanted, AnyOf) else 1 :])
-    goal = {Symbol("goal0", ("task",)): TRUE, **left}
+    return _wanting(world, wanted, left) or (world, meant)
+
+
+def _with_excluded(world: RandomWorld, meant: Interpreter, share: float) -> tuple[RandomWorld, Interpreter]:
+    """Return a world; in a share of the worlds, replace goals by goals that exclude one of several values, or an amount."""
+    rng, problem = Random(f"negated {world.seed}"), world.problem
+    if rng.random() >= share:
+        return world, meant
+    changed = problem.domain.aggregates.keys() | {s for one in problem.domain.behaviors.values() for s in one.changes}
+    kinds = {s: problem.domain.situations[s.situation] for s in meant.slots if s.arguments and s.situation in changed}
+    amounts = [symbol for symbol, kind in kinds.items() if kind.quantity is not None]
+    several = [symbol for symbol, kind in kinds.items() if len(problem.classes.get(kind.range, ())) > 2]
+    symbols = several if several and (not amounts or rng.random() < 0.7) else amounts
+    found, wanting = world, meant
+    for symbol in rng.sample(symbols, min(len(symbols), rng.choice((1, 1, 2)))):
+        value = meant.value(meant.initial, symbol)
+        wanted: Condition
+        if symbols is amounts:
+            limit = Fraction(str(value)) if _sayable(value) else Fraction(1)
+            wanted = Comparison(Amount(symbol.situation, symbol.arguments), "=", limit, negated=True)
+        else:
+            value = value if rng.random() < 0.7 else rng.choice(problem.classes[kinds[symbol].range])
+            wanted = ValueCondition(symbol.situation, symbol.arguments, value, negated=True)
+        left = {
+            s: v
+            for s, v in found.problem.goal.items()
+            if s.arguments == ("task",) or (s != symbol and rng.random() < 0.7)
+        }
+        found, wanting = _wanting(found, wanted, left) or (found, wanting)
+    return found, wanting
+
+
+def _wanting(
+    world: RandomWorld, wanted: Condition, left: Mapping[Symbol, str]
+) -> tuple[RandomWorld, Interpreter] | None:
+    """Return a world with a goal that isn't a fact, and the goals `left`; return None if these goals hold initially."""
+    problem = world.problem
+    domain = problem.domain
+    name = f"goal{sum(symbol.arguments == ('task',) for symbol in left)}"
+    rule = Rule(name, (Parameter("?task", TASK),), (), (wanted,))
+    levels = [domain.situations[each].level for each in named([wanted])]
+    levels += [problem.value_levels.get(term, 1) for inner in walk(wanted) for term in terms(inner)]
+    derived = SituationType(name, (TASK,), "Truth", max(levels), boolean=True, default=FALSE)
+    more = replace(domain, situations={**domain.situations, name: derived}, rules={**domain.rules, name: (rule,)})
+    goal = {Symbol(name, ("task",)): TRUE, **left}
     changed = replace(problem, domain=more, goal=goal, classes={**problem.classes, TASK: ("task",)})
     other = Interpreter(changed)
     if other.wanted(other.initial):
-        return world, meant
-    return replace(world, problem=changed, owners={**world.owners, "goal0": ()}), other
+        return None
+    return replace(world, problem=changed, owners={**world.owners, name: ()}), other
 
 
 def _as_conditions(problem: Problem, symbol: Symbol, value: str) -> tuple[Condition, ...]:
@@ -286,7 +328,7 @@ class _Wishes:
 
 def _sayable(value: Any) -> bool:
     """Return whether a scene can state a value: a name, or a number with few digits."""
-    return isinstance(value, str) or (Fraction(value).denominator in (1, 2, 4) and abs(value) < 100)
+    return isinstance(value, str) or (abs(value) < 100 and Fraction(value).denominator in (1, 2, 4))
 
 
 def _recursive(aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]]) -> bool:

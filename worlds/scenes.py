@@ -265,14 +265,19 @@ class _Scene:
         others = [
             other for other in self.problem.classes.get(self.situations[symbol.situation].range, ()) if other != value
         ]
-        if (
-            len(others) == 1
-            and self.problem.value_levels.keys().isdisjoint((*others, value))
-            and self.rng.random() < 0.4
-        ):
+        if len(others) == 1 and self.rng.random() < 0.4:
             said = self.said(symbol.situation, symbol.arguments, others[0])
             return said[:-1] if said[-1] == "c:negated true" else [*said, "c:negated true"]
         return self.said(symbol.situation, symbol.arguments, value)
+
+    def wish(self, one: Condition) -> str:
+        """Write a goal that isn't a fact, and return the IRI of the goal; a goal on one amount names the amount itself."""
+        match one:
+            case Comparison(Amount(situation, arguments), "=", Fraction() as limit, True):
+                said = [f"c:situationType :{situation}", *self.arguments(arguments), f"c:amount {_decimal(limit)}"]
+                return self.part("Comparison", *said, 'c:sign "="', "c:negated true")
+            case _:
+                return self.condition(one)
 
     def condition(self, one: Condition) -> str:
         """Write a condition with its nested conditions, and return the IRI of the condition."""
@@ -394,7 +399,7 @@ class _Scene:
             if symbol.arguments == ("task",):
                 (rule,) = self.problem.domain.rules[symbol.situation]
                 goals.append(f":{symbol.situation}")
-                node = self.condition(rule.conditions[0])
+                node = self.wish(rule.conditions[0])
                 self.nodes[-1] = (
                     " ; ".join([self.nodes[-1].replace(node, goals[-1], 1).removesuffix(" ."), *soft]) + " ."
                 )

@@ -50,10 +50,11 @@ def test_the_interpreter_agrees_with_the_naive_reading() -> None:
                 assert naive == own, (seed, one.name)
 
 
-def test_the_scene_of_a_random_world_has_its_goals_and_reachable_states(tmp_path: Path) -> None:
+@pytest.mark.parametrize("negated", [0.0, 1.0])
+def test_the_scene_of_a_random_world_has_its_goals_and_reachable_states(negated: float, tmp_path: Path) -> None:
     """The problem that is read from the file has the same applicable behaviours and reachable states as the drawn world."""
     for seed in SEEDS:
-        world = mixed(seed)
+        world = mixed(seed, negated=negated)
         file = tmp_path / "w.ttl"
         file.write_text(scene(world), encoding="utf-8")
         known = load(file)
