@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import pyoxigraph as ox
 
+from confab.reasoner.closure import closure
 from confab.reasoner.names import local_name
 from confab.reasoner.updates.behaviors import UpdateCompiler
 from confab.reasoner.updates.texts import Ask, TextPosition, Update, Vocabulary
@@ -112,14 +113,14 @@ def _compile(
     done: CompiledUpdates,
 ) -> None:
     """Compile one behaviour together with the behaviours that it extends, or record the fault."""
-    sources = list(_sources(behavior, extends, ()))
+    sources = list(_sources(behavior, extends, set()))
     if lacking := [source for source in sources if source not in updates and source not in extends]:
         name = local_name(lacking[0])
         what = f"it extends {name}, which isn't written as an update"
         remedy = f"write {name} as one (confab convert --behaviors sparql), or repeat what it says"
         done.faults.append(UpdateFault(TextPosition(behavior, 1, 1), what, remedy))
         return
-    if len(set(sources)) < len(sources):
+    if any(source in closure(extends.get(source, ()), lambda each: extends.get(each, ())) for source in sources):
         done.faults.append(UpdateFault(TextPosition(behavior, 1, 1), "it extends itself", "take out one c:extends"))
         return
     terms = {name: ("", *known[1:]) for source in sources for name, known in declared.get(source, {}).items()}
@@ -134,11 +135,10 @@ def _compile(
     done.places |= compiler.nodes.places
 
 
-def _sources(behavior: str, extends: Mapping[str, Sequence[str]], above: tuple[str, ...]) -> Iterator[str]:
-    """Yield all behaviours that a behaviour extends, and the behaviour itself last. In a cycle, a behaviour is yielded twice."""
-    if behavior in above:
-        yield behavior
-        return
+def _sources(behavior: str, extends: Mapping[str, Sequence[str]], seen: set[str]) -> Iterator[str]:
+    """Yield all behaviours that a behaviour extends, each after those that it extends itself, and the behaviour itself last."""
+    seen.add(behavior)
     for other in extends.get(behavior, ()):
-        yield from _sources(other, extends, (*above, behavior))
+        if other not in seen:
+            yield from _sources(other, extends, seen)
     yield behavior

@@ -262,6 +262,21 @@ def test_a_behaviour_can_extend_a_behaviour_of_another_level(tmp_path: Path) -> 
         load(tmp_path / "small.ttl")
 
 
+def test_a_behaviour_can_extend_two_behaviours_that_extend_the_same_behaviour(tmp_path: Path) -> None:
+    faults(tmp_path, f"{HEAD}}}")
+    sides = {"LEFT": "?tube :fits ?slot", "RIGHT": "?tube :spot ?slot"}
+    more = [
+        f':{name} a owl:NamedIndividual, c:Behavior ; c:level 2 ; c:extends :MOVE ; c:update "INSERT {{}} WHERE {{ {said} }}" .'
+        for name, said in sides.items()
+    ]
+    more.append(":BOTH a owl:NamedIndividual, c:Behavior ; c:level 2 ; c:extends :LEFT, :RIGHT .")
+    with (tmp_path / "small.ttl").open("a") as file:
+        file.write("\n".join(more))
+    found = {local_name(iri): behavior for iri, behavior in behaviors(load(tmp_path / "small.ttl")).items()}
+    assert found["BOTH"].effects == found["MOVE"].effects
+    assert {*found["BOTH"].preconditions} == {*found["LEFT"].preconditions, *found["RIGHT"].preconditions}
+
+
 def test_an_update_that_is_already_expanded_is_not_expanded_again(tmp_path: Path) -> None:
     said = only(tmp_path, f"{HEAD}}}")
     lines = load(tmp_path / "small.ttl").ntriples().splitlines(keepends=True)
