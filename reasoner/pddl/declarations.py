@@ -26,8 +26,8 @@ class Typed:
 class Action:
     """A parsed action; the names in `precondition` and `effect` have been checked against the declarations.
 
-    For a durative action, `precondition` and `effect` describe the action as a whole (`confab.reasoner.pddl.durative`).
-    `durative` contains the conditions and effects of a durative action with their times; None for other actions.
+    For a durative action, `precondition` and `effect` contain all conditions and effects without their times, `durative` contains
+    them with their times. `durative` is None for other actions.
     """
 
     name: str

@@ -1,10 +1,4 @@
-"""Durative actions of PDDL 2.1: their conditions and effects with times, and their translation to one instantaneous action.
-
-The instantaneous action is equivalent to the durative action if no other action overlaps it:
-
-- its precondition omits a condition (``over all`` or ``at end``) that an effect at the start achieves;
-- its effect omits an effect at the start if an effect at the end overwrites it.
-"""
+"""Durative actions of PDDL 2.1: their durations, and their conditions and effects with times."""
 
 from __future__ import annotations
 
@@ -93,52 +87,13 @@ def timed(form: Form | None, what: str, duration: PddlWord | Form) -> Iterator[t
         raise NotTimedError(form, f"wanted (at start …), (over all …) or (at end …), got ({form.head or '…'} …)")
 
 
-def whole(parts: Durative, place: Form) -> tuple[Form | None, Form | None]:
-    """Return the precondition and the effect of the instantaneous action that is equivalent to a durative action."""
-    begun = {_text(e) for span, effect in parts.effects if span == "start" for e in _conjuncts(effect)}
-    ended = {
-        _text(_atom(e)) for span, effect in parts.effects if span == "end" for e in _conjuncts(effect) if _plain(e)
-    }
-    asked = [
-        c
-        for span, condition in parts.conditions
-        for c in _conjuncts(condition)
-        if span == "start" or _text(c) not in begun
-    ]
-    made = [
-        e
-        for span, effect in parts.effects
-        for e in _conjuncts(effect)
-        if span == "end" or not _plain(e) or _text(_atom(e)) not in ended
-    ]
-    return (_both(asked, place) if asked else None), (_both(made, place) if made else None)
+def whole(parts: Durative, place: Form) -> tuple[Form, Form]:
+    """Return all conditions of a durative action as one formula, and all its effects as one effect, without their times."""
+    return _both([one for _, one in parts.conditions], place), _both([one for _, one in parts.effects], place)
 
 
 def _both(forms: list[Form], place: Form) -> Form:
     return Form((PddlWord("and", place.line, place.column), *forms), place.line, place.column)
-
-
-def _conjuncts(form: Form) -> Iterator[Form]:
-    if form.head == "and":
-        for item in form.items[1:]:
-            if isinstance(item, Form):
-                yield from _conjuncts(item)
-    elif form.items:
-        yield form
-
-
-def _plain(form: Form) -> bool:
-    """Return whether an effect is a literal: it makes one atom true or false without a condition."""
-    return form.head not in ("when", "forall", "assign", "increase", "decrease", "scale-up", "scale-down")
-
-
-def _atom(form: Form) -> Form:
-    inner = form.items[1] if form.head == "not" and len(form.items) == 2 else form
-    return inner if isinstance(inner, Form) else form
-
-
-def _text(form: PddlWord | Form) -> str:
-    return form.text if isinstance(form, PddlWord) else f"({' '.join(map(_text, form.items))})"
 
 
 def _put(form: Form, duration: PddlWord | Form) -> Form:

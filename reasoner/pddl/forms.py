@@ -64,6 +64,33 @@ def typed_in(form: Form) -> list[Typed]:
     return [*found, *(Typed(w.text, "object", w) for w in waiting)]
 
 
+def distinct(form: Form, taken: Collection[str], names: Mapping[str, str] | None = None) -> Form:
+    """Return a copy of a formula or an effect in which no quantified variable has the name of a variable in whose scope it is.
+
+    Parameters
+    ----------
+    form : Form
+        A formula or an effect whose syntax has been checked.
+    taken : collection of str
+        The variables in whose scope `form` is.
+    names : mapping of str to str, optional
+        The new names of quantified variables in whose scope `form` is.
+    """
+    names = names or {}
+    if form.head in ("exists", "forall"):
+        for one in typed_in(form.items[1]):  # type: ignore[arg-type]
+            new = one.name
+            while new in taken:
+                new += "_"
+            taken, names = {*taken, new}, {**names, one.name: new}
+    items = (
+        distinct(item, taken, names) if isinstance(item, Form) else
+        replace(item, text=names[item.text]) if item.text in names else item
+        for item in form.items
+    )  # fmt: skip
+    return replace(form, items=tuple(items))
+
+
 def words_of(form: Form) -> Atom:
     """Return the words of a list, without the words of nested lists."""
     return tuple(item.text for item in form.items if isinstance(item, PddlWord))

@@ -70,10 +70,12 @@ from confab.reasoner.symbols import (
     Rule,
     SituationType,
     Symbol,
+    Timing,
     ValueCondition,
     ValueEffect,
     Witness,
 )
+from confab.reasoner.timing import projected
 
 THING = "Thing"
 """The class of all objects, PDDL's ``object``."""
@@ -462,22 +464,28 @@ class _Import:
         """Return the behaviour for an action; return None if the action is never applicable."""
         action, variables = self.pddl.actions[name], _Variables(self)
         parameters = tuple(Parameter(self.term(p.name), self.kind(p.type)) for p in action.parameters)
-        found = self.simplified(c for form in conjuncts(action.precondition) for c in variables.condition(form))
-        if found is None:
-            return None
-        conditions = tuple(dict.fromkeys(found))
-        effects = self.value_effects(self.effects[name], variables, conditions)
-        amounts = self.amount_effects(name, self.numeric[name], variables, conditions)
+        lies: Timing | None = None
+        if action.durative is None:
+            found = self.simplified(c for form in conjuncts(action.precondition) for c in variables.condition(form))
+            if found is None:
+                return None
+            conditions = tuple(dict.fromkeys(found))
+            effects = self.value_effects(self.effects[name], variables, conditions)
+            amounts = self.amount_effects(name, self.numeric[name], variables, conditions)
+        else:
+            lies = timing(self, action, action.durative, variables)
+            if lies is None:
+                return None
+            conditions, made = projected(lies.conditions, lies.effects)
+            effects = tuple(one for one in made if isinstance(one, ValueEffect))
+            amounts = tuple(one for one in made if isinstance(one, AmountEffect))
         used = {word for atom in words_in(action.precondition, action.effect) for word in atom}
         unused = [p for p in action.parameters if p.name not in used]
         conditions += tuple(ClassCondition(self.term(p.name), self.kind(p.type)) for p in unused)
         named = self.name("action", name, name.upper())
-        behavior = Behavior(named, self.level, parameters, (), conditions, effects, amounts=amounts)
-        if action.durative is not None:
-            lies = timing(self, action.durative, variables, conditions)
-            if lies.duration is not None and not isinstance(lies.duration, Fraction):
-                conditions = (*conditions, Comparison(lies.duration, ">=", Fraction(0)))
-            behavior = replace(behavior, preconditions=conditions, timing=lies)
+        if lies is not None and lies.duration is not None and not isinstance(lies.duration, Fraction):
+            conditions = (*conditions, Comparison(lies.duration, ">=", Fraction(0)))
+        behavior = Behavior(named, self.level, parameters, (), conditions, effects, amounts=amounts, timing=lies)
         price = self.price(name)
         if not price and self.pddl.metric is None:
             price = Fraction(1)
@@ -612,7 +620,7 @@ class _Variables:
         found = {}
         for one in typed:
             name = f"?w_{self.table.term(one.name)[1:]}"
-            while name in self.kinds:
+            while name in self.kinds or name in self.table.variables:
                 name += "_"
             self.kinds[name] = self.table.kind(one.type)
             found[self.table.term(one.name)] = name

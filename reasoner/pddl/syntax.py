@@ -20,6 +20,7 @@ from pathlib import Path
 
 from confab.reasoner.pddl.declarations import CHANGES, COMPARISONS, Action, Axiom, Pddl, Typed, either
 from confab.reasoner.pddl.durative import Durative, NotTimedError, duration_in, timed, whole
+from confab.reasoner.pddl.forms import distinct
 from confab.reasoner.pddl.metric import Metric
 from confab.reasoner.pddl.words import MOST_BYTES, Form, PddlError, PddlWord, form_of, is_number
 
@@ -178,12 +179,12 @@ class _Reader:
             if name in self.pddl.preferences:
                 raise self.fail(part, f"a second preference {name}")
             self.condition(part.items[2], {})
-            self.pddl.preferences[name] = part.items[2]
+            self.pddl.preferences[name] = distinct(part.items[2], ())
         if self.pddl.preferences:
             form = Form((PddlWord("and", form.line, form.column), *hard), form.line, form.column)
         if form.items:
             self.condition(form, {})
-            self.pddl.goal = form
+            self.pddl.goal = distinct(form, ())
 
     def metric(self, form: Form) -> None:
         words = form.items[1:]
@@ -308,8 +309,9 @@ class _Reader:
             self.condition(precondition, variables)
         if effect and effect.items:
             self.effect(effect, variables)
-        given = precondition if precondition and precondition.items else None
-        self.pddl.actions[name.text] = Action(name.text, parameters, given, effect, name)
+        given = distinct(precondition, variables) if precondition and precondition.items else None
+        made = distinct(effect, variables) if effect else None
+        self.pddl.actions[name.text] = Action(name.text, parameters, given, made, name)
 
     def durative(
         self,
@@ -336,6 +338,9 @@ class _Reader:
             self.condition(one, variables)
         for _, one in found.effects:
             self.effect(one, variables)
+        conditions = tuple((span, distinct(one, variables)) for span, one in found.conditions)
+        effects = tuple((span, distinct(one, variables)) for span, one in found.effects)
+        found = replace(found, conditions=conditions, effects=effects)
         asked, made = whole(found, form)
         self.pddl.actions[name.text] = Action(name.text, parameters, asked, made, name, found)
 
@@ -353,9 +358,10 @@ class _Reader:
             (one, other.type if one.type == "object" else one.type) for one, other in zip(given, declared, strict=True)
         )
         parameters = tuple(Typed(one.name, kind, one.place) for one, kind in typed)
+        variables = self.scope(parameters, {})
         if form.items[2].items:
-            self.condition(form.items[2], self.scope(parameters, {}))
-        self.pddl.axioms.append(Axiom(head.head, parameters, form.items[2]))
+            self.condition(form.items[2], variables)
+        self.pddl.axioms.append(Axiom(head.head, parameters, distinct(form.items[2], variables)))
 
     def constraints(self, parts: Sequence[PddlWord | Form], each: Sequence[Form] = ()) -> None:
         """Parse constraints on all states of a plan, also inside ``and`` and ``forall``.
@@ -412,7 +418,7 @@ class _Reader:
     def derive(self, name: str, typed: tuple[Typed, ...], condition: Form) -> Form:
         """Add a derived predicate for a condition, with a new name; return the atom of the predicate."""
         atom = self.declare(name, typed)
-        self.pddl.axioms.append(Axiom(atom.head, typed, condition))
+        self.pddl.axioms.append(Axiom(atom.head, typed, distinct(condition, {one.name for one in typed})))
         return atom
 
     def remember(self, name: str, source: Form, typed: tuple[Typed, ...]) -> Form:
@@ -593,7 +599,7 @@ class _Reader:
         """Parse one element of ``:init``: an atom, a negated atom, the value of a function or a timed initial literal."""
         if not isinstance(item, Form):
             raise self.fail(item, f"wanted a fact, got '{item.text}'")
-        if item.head == "at" and len(item.items) == 3 and is_number(item.items[1]):
+        if item.head == "at" and len(item.items) == 3 and is_number(item.items[1]) and isinstance(item.items[2], Form):
             self.timed_fact(item)
             return
         if item.head == "=":

@@ -71,32 +71,23 @@ class TimedNames(Protocol):
         """Return the effects on amounts that are equivalent to PDDL effects on functions."""
 
 
-def timing(
-    table: TimedNames, parts: Durative, variables: QuantifiedVariables, conditions: Sequence[Condition]
-) -> Timing:
-    """Return the duration, conditions and effects of a durative action.
-
-    Parameters
-    ----------
-    table : TimedNames
-    parts : Durative
-    variables : QuantifiedVariables
-        The quantified variables of the behaviour.
-    conditions : sequence of Condition
-        The preconditions of the equivalent instantaneous action.
-    """
+def timing(table: TimedNames, action: Action, parts: Durative, variables: QuantifiedVariables) -> Timing | None:
+    """Return the duration, conditions and effects of a durative action; return None if the action is never applicable."""
     asked: list[tuple[Span, Condition]] = []
     made: list[tuple[Span, AnyEffect]] = []
-    for span, form in parts.conditions:
-        found = table.simplified(c for one in conjuncts(form) for c in variables.condition(one))
-        asked += [(SPANS[span], one) for one in found or ()]
+    for span, at in SPANS.items():
+        forms = [one for its, form in parts.conditions if its == span for one in conjuncts(form)]
+        found = table.simplified(c for form in forms for c in variables.condition(form))
+        if found is None:
+            return None
+        asked += [(at, one) for one in found]
     for span in ("start", "end"):
         forms = [form for at, form in parts.effects if at == span]
         values = tuple(effect for form in forms for effect in effects_of(form))
         numbers = tuple(effect for form in forms for effect in numeric_of(form))
-        own = (*conditions, *(c for at, c in asked if at is not Span.THROUGHOUT))
+        own = tuple(c for at, c in asked if at is SPANS[span] or (at is Span.THROUGHOUT and span == "end"))
         made += [(SPANS[span], one) for one in table.value_effects(values, variables, own)]
-        made += [(SPANS[span], one) for one in table.amount_effects("", numbers, variables, own)]
+        made += [(SPANS[span], one) for one in table.amount_effects(action.name, numbers, variables, own)]
     return Timing(table.number(parts.duration, {}), (), tuple(dict.fromkeys(asked)), tuple(made))
 
 

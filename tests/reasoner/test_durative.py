@@ -211,3 +211,42 @@ def test_a_condition_or_effect_with_a_missing_or_wrong_time_is_refused_with_its_
     domain = f"{head}\n(:durative-action strike :parameters (?m - match) :duration (= ?duration 5) {text}))"
     with pytest.raises(PddlError, match=rf"domain:4:\d+: .*({said})"):
         parse(domain, FUSES)
+
+
+@pytest.mark.parametrize(
+    ("action", "init", "goal", "steps"),
+    [
+        ("(at start (not (p))) :effect (and (at start (p)) (when (at end (p)) (at end (q))))", "", "(q)", ["A"]),
+        (
+            "(at start (p)) :effect (and (at start (not (p))) (when (at end (not (p))) (at end (q))) (at end (p)))",
+            "(p)",
+            "(and (p) (q))",
+            ["A"],
+        ),
+        (
+            "(at start (not (p))) :effect (and (at start (p)) (when (at end (p)) (at end (not (q)))) (at end (r)))",
+            "(q)",
+            "(and (q) (r))",
+            None,
+        ),
+        (
+            "(at start (< (n) 1)) :effect (and (at start (increase (n) 1)) (when (at end (>= (n) 1)) (at end (q))))",
+            "",
+            "(q)",
+            ["A"],
+        ),
+    ],
+)
+def test_a_condition_of_an_effect_at_the_end_is_judged_at_the_end(
+    action: str, init: str, goal: str, steps: list[str] | None, tmp_path: Path
+) -> None:
+    domain = f"""(define (domain d) (:predicates (p) (q) (r)) (:functions (n))
+      (:durative-action a :parameters () :duration (= ?duration 5) :condition {action}))"""
+    found = imported(parse(domain, f"(define (problem e) (:domain d) (:init {init} (= (n) 0)) (:goal {goal}))"))
+    path = tmp_path / "scene.ttl"
+    path.write_text(turtle(found.problem, "title", "description"), encoding="utf-8")
+    read = confab.load(str(path))
+    for name, behavior in found.problem.domain.behaviors.items():
+        assert set(read.problem.domain.behaviors[name].every_effect) == set(behavior.every_effect)
+    plan = read.plan(optimal=True).outcome.plan
+    assert (plan and [step.behavior for step in plan.primitives]) == steps

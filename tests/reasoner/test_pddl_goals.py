@@ -250,3 +250,53 @@ def test_a_cost_is_written_with_all_its_digits(factor: str, tmp_path: Path) -> N
      (:action second :parameters () :precondition (h) :effect (and (g) (increase (total-cost) 1)))"""
     problem = f"(:init (= (total-cost) 0)) (:goal (g)) (:metric minimize (* {factor} (total-cost)))"
     assert cheapest(domain, problem, tmp_path) == ["first", "second"]
+
+
+@pytest.mark.parametrize(
+    ("action", "init", "goal", "steps"),
+    [
+        (
+            "(?w_x) :precondition (exists (?x) (and (lit ?x) (at ?w_x ?x))) :effect (done)",
+            "(lit b) (at a b)",
+            "(done)",
+            ["act a"],
+        ),
+        (
+            "(?x ?l) :precondition (at ?x ?l) :effect (and (not (at ?x ?l)) (forall (?x) (when (done) (at ?x ?l))))",
+            "(done) (at a c) (at b d)",
+            "(and (at b c) (at b d))",
+            ["act a c"],
+        ),
+        (
+            "(?x ?a ?b) :precondition (at ?x ?a) :effect"
+            " (and (not (at ?x ?a)) (at ?x ?b) (forall (?x) (when (at ?x ?b) (not (at ?x ?b)))))",
+            "(at a c) (at b d)",
+            "(and (at a d) (not (at b d)))",
+            ["act a c d"],
+        ),
+        (
+            "(?x ?x_) :precondition (forall (?x ?x_) (exists (?x) (at ?x ?x_))) :effect (at ?x ?x_)",
+            "(at a a) (at a b) (at b c) (at c d)",
+            "(at d d)",
+            ["act d d"],
+        ),
+        (
+            "(?x) :precondition (and) :effect (lit ?x)",
+            "(at a b)",
+            "(exists (?x) (and (lit ?x) (exists (?y) (and (at ?x ?y) (exists (?x) (and (not (lit ?x)) (at ?x ?y)))))))",
+            None,
+        ),
+    ],
+)
+def test_each_quantified_variable_is_another_one_than_those_outside_its_quantifier(
+    action: str, init: str, goal: str, steps: list[str] | None, tmp_path: Path
+) -> None:
+    domain = f"(:predicates (at ?x ?l) (lit ?x) (done)) (:action act :parameters {action})"
+    assert cheapest(domain, f"(:objects a b c d) (:init {init}) (:goal {goal})", tmp_path) == steps
+
+
+def test_objects_may_have_numbers_as_names(tmp_path: Path) -> None:
+    domain = """(:predicates (at ?x ?y) (way ?x ?y)) (:action move :parameters (?x ?a ?b)
+      :precondition (and (at ?x ?a) (way ?a ?b)) :effect (and (not (at ?x ?a)) (at ?x ?b)))"""
+    problem = "(:objects 1 2 3) (:init (at 1 2) (way 2 3)) (:goal (at 1 3))"
+    assert cheapest(domain, problem, tmp_path) == ["move 1 2 3"]
