@@ -5,9 +5,8 @@ from __future__ import annotations
 import re
 from contextlib import suppress
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TypeAlias
-
-import pyoxigraph as ox
 
 from confab.planner.grounded.grounding import ground
 from confab.planner.grounded.plan_windows import regrouped, without_superfluous_steps
@@ -15,7 +14,7 @@ from confab.planner.grounded.task import Task
 from confab.planner.paper.transitions import Model, Values
 from confab.planner.plan import Plan, Step, UngroundableError
 from confab.reasoner.files import check_replaceable, made_folder, write_whole
-from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.graph.knowledge import KnowledgeError, load
 from confab.reasoner.kinds import DOMAIN, IMPORTED, PROBLEM, stamped
 from confab.reasoner.limits import OutOfTimeError
 from confab.reasoner.pddl.exporting import Exported, plan_of, to_pddl
@@ -23,6 +22,7 @@ from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse_files
 from confab.reasoner.pddl.turtle import turtle
 from confab.reasoner.pddl.words import PddlError
+from confab.reasoner.reading.problem import read
 from confab.reasoner.symbols import GroundBehavior, Problem
 
 Ground: TypeAlias = tuple[str, tuple[str, ...]]
@@ -54,7 +54,11 @@ def import_pddl(domain: Path, problem: Path, out: Path, level: int = 1) -> Probl
         raise KnowledgeError(f"{domain}, {problem}: formulas are nested too deeply; nest them less deeply") from error
     title = f"{pddl.problem} ({pddl.domain})"
     text = turtle(found.problem, title, f"The PDDL problem {pddl.problem} of the domain {pddl.domain}.", found.said)
-    write_whole(out, stamped(IMPORTED, [text]), check=_check_turtle)
+    try:
+        _check_scene(text)
+    except KnowledgeError as error:
+        raise KnowledgeError(f"{domain}, {problem}: the scene of this problem can't be used: {error}") from error
+    write_whole(out, stamped(IMPORTED, [text]))
     return found.problem
 
 
@@ -68,10 +72,12 @@ def _states_problem(file: Path) -> bool:
     return False
 
 
-def _check_turtle(file: Path) -> None:
-    """Raise `SyntaxError` if a file isn't valid Turtle."""
-    for _ in ox.parse(path=str(file), format=ox.RdfFormat.TURTLE):
-        pass
+def _check_scene(text: str) -> None:
+    """Raise `KnowledgeError` if a text isn't a scene that planning can use."""
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "scene.ttl"
+        file.write_text(text, encoding="utf-8")
+        read(load(file))
 
 
 def exported(problem: Problem, level: int | None) -> Exported:

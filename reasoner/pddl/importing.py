@@ -30,10 +30,10 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property, reduce
 from itertools import product
-from math import prod
 
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, Quantity, bounds_written, written
-from confab.reasoner.derivation import circles
+from confab.reasoner.closure import closure
+from confab.reasoner.derivation import circles, circular, needed
 from confab.reasoner.pddl.declarations import COMPARISONS, Axiom, Pddl, Typed
 from confab.reasoner.pddl.forms import (
     Atom,
@@ -257,12 +257,16 @@ class _Import:
             head = tuple(parameters) or (Parameter("?the_world", WORLD),)
             its = () if conditions is None else (Rule(name, head, (), tuple(dict.fromkeys(conditions))),)
             found[name] = (*found.get(name, ()), *its)
+        said = {ours: theirs for (_, theirs), ours in self.names.items()}
         for one, other in circles(found):
-            said = {ours: theirs for (_, theirs), ours in self.names.items()}
             raise PddlError(
                 f"'{said[one]}' is derived from (not ({said[other]} …)), which is derived from it in turn; "
                 "no planner can tell which of the two holds"
             )
+        constrained = [self.places[one].situation for one in (*self.pddl.forbidden, *self.pddl.remembers.values())]
+        read = closure(constrained, lambda one: {s for rule in found.get(one, ()) for s, _ in needed(rule.conditions)})
+        for name in sorted(read & circular(found)):
+            raise PddlError(f"'{said[name]}' is derived from itself; (:constraints …) can't use such a predicate")
         return found
 
     def situations(
@@ -304,6 +308,7 @@ class _Import:
             found[name] = SituationType(name, arguments, "Truth", default=FALSE, boolean=True)
             self.places[predicate] = PredicateTranslation(name)
         for function in sorted(self.amounts):
+            self.check_numbers(function)
             arguments = tuple(self.kind(one.type) for one in self.pddl.functions[function]) or (WORLD,)
             name = self.name("situation", f"({function})", function.upper())
             found[name] = SituationType(name, arguments, name, quantity=Quantity())
@@ -471,9 +476,9 @@ class _Import:
                 return None
             conditions = tuple(dict.fromkeys(found))
             effects = self.value_effects(self.effects[name], variables, conditions)
-            amounts = self.amount_effects(name, self.numeric[name], variables, conditions)
+            amounts = self.amount_effects(self.numeric[name], variables, conditions)
         else:
-            lies = timing(self, action, action.durative, variables)
+            lies = timing(self, action.durative, variables)
             if lies is None:
                 return None
             conditions, made = projected(lies.conditions, lies.effects)
@@ -530,7 +535,6 @@ class _Import:
 
     def amount_effects(
         self,
-        name: str,
         effects: Sequence[NumericEffect],
         variables: QuantifiedVariables,
         conditions: Sequence[Condition],
@@ -540,11 +544,6 @@ class _Import:
         for effect in effects:
             if effect.function.head not in self.amounts:
                 continue
-            if effect.head == "assign" and not self.everywhere(effect.function.head):
-                raise PddlError(
-                    f"action '{name}': it assigns '{effect.function.head}', which has no first value for some objects; "
-                    "state one of each in :init"
-                )
             for named in self.instances(effect):
                 when = self.simplified(
                     c for form in effect.when for part in conjuncts(form) for c in variables.condition(part, named)
@@ -559,10 +558,15 @@ class _Import:
                 found.append(AmountEffect(at.situation, at.arguments, operation, by, when))
         return tuple(found)
 
-    def everywhere(self, function: str) -> bool:
-        """Return whether a function has an initial value for every combination of arguments."""
-        things = prod(len(self.pddl.of_type(one.type)) for one in self.pddl.functions[function])
-        return sum(words[0] == function for words in self.pddl.numbers) == things
+    def check_numbers(self, function: str) -> None:
+        """Raise an error if a changing function has no initial number for some objects of its arguments' types."""
+        things = (self.pddl.of_type(one.type) for one in self.pddl.functions[function])
+        for row in product(*things):
+            if (function, *row) not in self.pddl.numbers:
+                raise PddlError(
+                    f"({' '.join((function, *row))}) has no number in :init, but actions change '{function}'; state its number, "
+                    f"or declare '{function}' for a type whose objects all have one"
+                )
 
     def value_effects(
         self, effects: Sequence[PddlEffect], variables: QuantifiedVariables, conditions: Sequence[Condition]

@@ -63,7 +63,6 @@ class TimedNames(Protocol):
 
     def amount_effects(
         self,
-        name: str,
         effects: Sequence[NumericEffect],
         variables: QuantifiedVariables,
         conditions: Sequence[Condition],
@@ -71,7 +70,7 @@ class TimedNames(Protocol):
         """Return the effects on amounts that are equivalent to PDDL effects on functions."""
 
 
-def timing(table: TimedNames, action: Action, parts: Durative, variables: QuantifiedVariables) -> Timing | None:
+def timing(table: TimedNames, parts: Durative, variables: QuantifiedVariables) -> Timing | None:
     """Return the duration, conditions and effects of a durative action; return None if the action is never applicable."""
     asked: list[tuple[Span, Condition]] = []
     made: list[tuple[Span, AnyEffect]] = []
@@ -87,7 +86,7 @@ def timing(table: TimedNames, action: Action, parts: Durative, variables: Quanti
         numbers = tuple(effect for form in forms for effect in numeric_of(form))
         own = tuple(c for at, c in asked if at is SPANS[span] or (at is Span.THROUGHOUT and span == "end"))
         made += [(SPANS[span], one) for one in table.value_effects(values, variables, own)]
-        made += [(SPANS[span], one) for one in table.amount_effects(action.name, numbers, variables, own)]
+        made += [(SPANS[span], one) for one in table.amount_effects(numbers, variables, own)]
     return Timing(table.number(parts.duration, {}), (), tuple(dict.fromkeys(asked)), tuple(made))
 
 

@@ -106,6 +106,46 @@ def test_an_import_that_planning_could_not_use_is_refused_and_writes_no_file(tmp
     assert list(tmp_path.iterdir()) == []
 
 
+PATHS = """(:predicates (way ?x ?y) (path ?x ?y)) (:constants a b)
+ (:derived (path ?x ?y) (or (way ?x ?y) (exists (?z) (and (way ?x ?z) (path ?z ?y)))))
+ (:action build :parameters (?x ?y) :effect (way ?x ?y))"""
+FUEL = """(:predicates (full ?t)) (:functions (fuel ?t) (total-cost))
+ (:action fill :parameters (?t) :effect (and ({} (fuel ?t) 1) (full ?t) (increase (total-cost) {})))"""
+FUELLED = "(:objects t m) (:init (= (fuel t) 0) {}) (:goal (full t)) (:metric minimize (total-cost))"
+NO_NUMBER = "(fuel m) has no number in :init, but actions change 'fuel'"
+
+
+@pytest.mark.parametrize(
+    ("domain", "problem", "said"),
+    [
+        (FUEL.format("increase", 1), FUELLED.format(""), NO_NUMBER),
+        (FUEL.format("assign", 1), FUELLED.format(""), NO_NUMBER),
+        (FUEL.format("increase", 10**10), FUELLED.format("(= (fuel m) 0)"), "c:cost is '10000000000'"),
+        *(
+            (f"{PATHS} (:constraints {one})", "(:init) (:goal (way b a))", "'path' is derived from itself")
+            for one in (
+                "(always (not (path a a)))",
+                "(sometime (path a b))",
+                "(at-most-once (path a b))",
+                "(sometime-before (way b a) (path a b))",
+            )
+        ),
+    ],
+)
+def test_an_import_whose_scene_would_be_refused_is_refused_and_writes_no_file(
+    domain: str, problem: str, said: str, tmp_path: Path
+) -> None:
+    files = tmp_path / "d.pddl", tmp_path / "p.pddl"
+    for file, text in zip(
+        files, (f"(define (domain d) {domain})", f"(define (problem e) (:domain d) {problem})"), strict=True
+    ):
+        file.write_text(text)
+    with pytest.raises(KnowledgeError) as refused:
+        import_pddl(*files, tmp_path / "scene.ttl")
+    assert said in str(refused.value)
+    assert set(tmp_path.iterdir()) == {*files}
+
+
 # ---------------------------------------------------------------------------------------------------------- messages
 
 AT = SituationType("AT", ("Thing",), "Place")
