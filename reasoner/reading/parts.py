@@ -23,6 +23,7 @@ from confab.reasoner.symbols import (
     Aggregate,
     AmountEffect,
     Behavior,
+    ClassCondition,
     Comparison,
     Condition,
     Effect,
@@ -330,7 +331,7 @@ class Parts(NodeReader):
         return Rule(situation, parameters, variables, conditions)
 
     def aggregate(self, iri: str, kinds: Sequence[str]) -> Aggregate:
-        """Return the rule of a derived amount whose arguments have the given classes."""
+        """Return the rule of a derived amount whose arguments have the given classes; a sum or count exists for all members."""
         function, derived = self.word(iri, "aggregate", AGGREGATES), self.measured(iri)
         if not isinstance(derived, Amount):
             raise KnowledgeError(f"<{iri}>: a static relation isn't derived; make it a c:Amount")
@@ -349,7 +350,12 @@ class Parts(NodeReader):
             )
         bound = frozenset(one.name for one in (*parameters, *counted))
         asked = closed(conditions, bound, {one.name: one.kind for one in (*parameters, *variables)})
-        return Aggregate(derived.situation, function, number, parameters, counted, asked)
+        found = Aggregate(derived.situation, function, number, parameters, counted, asked)
+        if not found.kept:
+            return found
+        narrower = (ClassCondition(p.name, p.kind) for p, kind in zip(parameters, kinds, strict=True) if p.kind != kind)
+        every = tuple(replace(p, kind=kind) for p, kind in zip(parameters, kinds, strict=True))
+        return replace(found, parameters=every, conditions=(*narrower, *asked))
 
     def head_and_body(
         self, iri: str, situation: str, arguments: Sequence[str], kinds: Sequence[str]

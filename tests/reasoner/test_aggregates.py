@@ -185,6 +185,22 @@ def test_a_count_of_a_false_situation_leaves_out_the_individuals_that_lack_the_s
     assert confab.load(tmp_path / "having.ttl").plan().outcome.status is Status.UNSOLVABLE
 
 
+def test_a_count_is_0_for_an_individual_outside_of_the_class_that_its_rule_names(tmp_path: Path) -> None:
+    villas = (
+        LAMPS.replace("?h a :House", "?h a :Villa")
+        + ":Villa a owl:Class, owl:NamedIndividual ; rdfs:subClassOf :House ."
+    )
+    dark = villas.replace(":ON false }", ":ON false . ?h a :House ; :lamps ?n FILTER(?n = 0) }")
+    (tmp_path / "house.ttl").write_text(dark)
+    (tmp_path / "villa.ttl").write_text(
+        dark.replace(":house a owl:NamedIndividual, :House", ":house a owl:NamedIndividual, :Villa")
+    )
+    scene = confab.load(tmp_path / "house.ttl")
+    assert scene.problem.initial[Symbol("LAMPS", ("house",))] == "0"
+    assert scene.plan().plan.length == {1: 2}
+    assert confab.load(tmp_path / "villa.ttl").plan().outcome.status is Status.UNSOLVABLE
+
+
 WATTS = ":watts a owl:DatatypeProperty, owl:NamedIndividual, c:Relation ; rdfs:domain :Lamp ; rdfs:range xsd:integer ."
 
 
