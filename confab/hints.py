@@ -67,8 +67,8 @@ OVERVIEW: Mapping[str, str] = {
     "records(), dataframe(), csv(), tsv(), turtle(), iris(), standard(FORMAT); to show: print(table); also: terms, empty",
     "problem": "to read: initial, goal, individuals, classes, relations, domain.behaviors, domain.situations, weights, times, "
     "scene; to ask: members(CLASS), values(SYMBOL, LEVEL), goal_on(LEVEL), at_rest(LEVEL), id_of(BEHAVIOR, ARGUMENTS); also: "
-    "quantified, domain, first_level, only, without_goals, releases, concerns, may_leave_rest, parents, sees, below, superclasses, "
-    "value_levels",
+    "quantified, domain, first_level, only, without_goals, releases, read_by_goals, concerns, may_leave_rest, parents, sees, "
+    "below, superclasses, value_levels",
     "domain": "to read: behaviors, situations, levels, at_level(LEVEL), rules, constraints, aggregates, authored; also: "
     "first_ids, remembers",
     "behaviour": "to read: name, level, parameters, preconditions, effects, cost, variables, timing, amounts; to ask: "

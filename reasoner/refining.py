@@ -22,7 +22,7 @@ def never_done(problem: Problem) -> Iterator[tuple[Behavior, str]]:
     values: dict[str, set[str]] = {}
     for symbol, value in problem.initial.items():
         values.setdefault(symbol.situation, set()).add(value)
-    wanted = {symbol.situation for symbol in problem.goal}
+    wanted = {symbol.situation for symbol in problem.goal} | problem.read_by_goals.keys()
     for behavior in _needed(problem):
         below = next((level for level in domain.levels if level > behavior.level), None)
         for effect in _sure(problem, behavior):

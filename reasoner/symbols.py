@@ -637,7 +637,7 @@ class Problem:
 
     def releases(self, symbol: Symbol) -> bool:
         """Return whether a goal is about a symbol, directly or by a definition, and so releases the symbol from its rest value."""
-        terms = self._in_definitions.get(symbol.situation, ())
+        terms = self.read_by_goals.get(symbol.situation, ())
         return symbol in self.goal or symbol in self.weights or any(self._fits(symbol, one) for one in terms)
 
     def concerns(self, goal: Symbol, symbol: Symbol) -> bool:
@@ -653,7 +653,7 @@ class Problem:
         return all(term == one or one in self.members(term) for term, one in zip(terms, symbol.arguments, strict=True))
 
     @cached_property
-    def _in_definitions(self) -> Mapping[str, set[tuple[str, ...]]]:
+    def read_by_goals(self) -> Mapping[str, set[tuple[str, ...]]]:
         """The individuals or classes of the symbols with rest values that definitions of goals read, by situation type."""
         found: dict[str, set[tuple[str, ...]]] = {}
         for goal in {*self.goal, *self.weights}:

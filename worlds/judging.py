@@ -662,6 +662,7 @@ class Judge:
             for symbol, slot in self.meant.slots.items()
             if self.world.problem.domain.situations[symbol.situation].rest == self.meant.initial[slot]
             and self.world.problem.first_level(symbol) <= level
+            and not self.world.problem.releases(symbol)
         }
         flat = self.meant.wanting({**rested, **self.world.problem.goal})
         try:

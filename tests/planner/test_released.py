@@ -67,3 +67,11 @@ def test_of_two_soft_goals_about_one_symbol_the_greater_weight_wins(
     found = scene.plan(optimal=True).outcome
     assert found.proved and (found.total, found.bound) == (4.0, 4.0)
     assert found.plan is not None and found.plan.steps[0].arguments == ("box1", value)
+
+
+@pytest.mark.parametrize("goal", [":either", ":some", ":free1"])
+def test_a_goal_may_use_a_behaviour_whose_change_no_behaviour_takes_back(tmp_path: Path, goal: str) -> None:
+    text = BOXES.replace("GOALS", goal).replace("FILTER(?old != ?v)", "FILTER(?old != ?v && ?v != :shut)")
+    (tmp_path / "w.ttl").write_text(text, encoding="utf-8")
+    found = confab.load(tmp_path / "w.ttl").plan(optimal=True).outcome
+    assert found.proved and found.bound == 1.0
