@@ -650,7 +650,9 @@ class Problem:
         return bool(self._read_by(goal)) if rest is None else rest != self.goal.get(goal)
 
     def _fits(self, symbol: Symbol, terms: tuple[str, ...]) -> bool:
-        return all(term == one or one in self.members(term) for term, one in zip(terms, symbol.arguments, strict=True))
+        """Return whether the arguments of a symbol fit terms: individuals, classes, or variables that stand for any individual."""
+        of = zip(terms, symbol.arguments, strict=True)
+        return all(term == one or term.startswith("?") or one in self.members(term) for term, one in of)
 
     @cached_property
     def read_by_goals(self) -> Mapping[str, set[tuple[str, ...]]]:

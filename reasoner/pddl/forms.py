@@ -78,7 +78,8 @@ def distinct(form: Form, taken: Collection[str], names: Mapping[str, str] | None
     """
     names = names or {}
     if form.head in ("exists", "forall"):
-        for one in typed_in(form.items[1]):  # type: ignore[arg-type]
+        assert isinstance(form.items[1], Form)
+        for one in typed_in(form.items[1]):
             new = one.name
             while new in taken:
                 new += "_"
@@ -226,7 +227,8 @@ def functions_read(form: Form | None) -> Iterator[str]:
 def atoms_in(form: Form, predicates: Collection[str], own: dict[str, str]) -> list[tuple[Atom, dict[str, str]]]:
     """Return the atoms of a formula, each with the types of the quantified variables in whose scope it occurs."""
     if form.head in ("exists", "forall"):
-        own = own | {t.name: t.type for t in typed_in(form.items[1])}  # type: ignore[arg-type]
+        assert isinstance(form.items[1], Form)
+        own = own | {t.name: t.type for t in typed_in(form.items[1])}
     elif form.head in predicates:
         return [(words_of(form), own)]
     return [found for item in form.items[1:] if isinstance(item, Form) for found in atoms_in(item, predicates, own)]

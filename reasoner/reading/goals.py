@@ -13,7 +13,7 @@ from confab.reasoner.amounts import DECIMAL, Amount, bounds_written, written
 from confab.reasoner.closure import closure
 from confab.reasoner.derivation import TASK, needed
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.language import is_variable, terms, walk
+from confab.reasoner.language import is_variable, mentions, terms, walk
 from confab.reasoner.names import nearest
 from confab.reasoner.reading.parts import Parts
 from confab.reasoner.reading.rows import is_a
@@ -175,7 +175,9 @@ def with_task(problem: Problem, parts: Parts, tasks: Iterable[str]) -> Problem:
             )
         taken = weight is not None and _symbol_of(wanted) in goal  # the goal counts by itself
         if taken or not _is_fact(wanted, problem):
-            problem, symbol = with_derived_goal(problem, parts.names.short(task), parts.names.short(iri), wanted)
+            variables = {parts.term(one): parts.parameter(one) for one in sorted(parts.terms_below(iri))}
+            asked = tuple(variables[name] for name in sorted(mentions(wanted)) if name in variables)
+            problem, symbol = with_derived_goal(problem, parts.names.short(task), parts.names.short(iri), wanted, asked)
             goal[symbol] = TRUE
             weights |= {} if weight is None else {symbol: weight}
             deadlines |= {} if by is None else {symbol: by}
@@ -256,10 +258,12 @@ def _is_fact(wanted: Condition, problem: Problem) -> bool:
             return False
 
 
-def with_derived_goal(problem: Problem, task: str, name: str, wanted: Condition) -> tuple[Problem, Symbol]:
+def with_derived_goal(
+    problem: Problem, task: str, name: str, wanted: Condition, variables: tuple[Parameter, ...] = ()
+) -> tuple[Problem, Symbol]:
     """Return a problem with a new boolean situation type, and the symbol of this type.
 
-    The symbol is true if the condition `wanted` holds.
+    The symbol is true if the condition `wanted` holds; `variables` are the variables that `wanted` determines.
 
     The symbol that represents the goal has the task as its argument. A derived situation type turns a goal with alternatives or
     quantifiers into a fact like other goals.
@@ -272,7 +276,7 @@ def with_derived_goal(problem: Problem, task: str, name: str, wanted: Condition)
     levels = [domain.situations[situation].level for situation, _ in needed(conditions)]
     levels += [problem.value_levels.get(individual, 1) for individual in individuals]
     derived = SituationType(free, (TASK,), "Truth", max(levels, default=1), default=FALSE, boolean=True)
-    rule = Rule(free, (Parameter("?task", TASK),), (), conditions)
+    rule = Rule(free, (Parameter("?task", TASK),), variables, conditions)
     tasks = tuple(dict.fromkeys((*problem.classes.get(TASK, ()), task)))
     more = replace(domain, situations={**domain.situations, free: derived}, rules={**domain.rules, free: (rule,)})
     classes = {**problem.classes, TASK: tasks, "Truth": problem.classes.get("Truth", (FALSE, TRUE))}

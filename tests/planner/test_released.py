@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import confab
+from confab.planner.solve import Mode
 from confab.planner.validation import validate
 
 BOXES = """
@@ -45,9 +46,9 @@ def boxes(folder: Path, goals: str) -> confab.Scene:
 
 @pytest.mark.parametrize("mode", ["guarded", "optimal", "paper"])
 @pytest.mark.parametrize("goal", [":shut1", ":either", ":some", ":free1"])
-def test_a_goal_of_any_form_releases_what_it_is_about(tmp_path: Path, goal: str, mode: str) -> None:
+def test_a_goal_of_any_form_releases_what_it_is_about(tmp_path: Path, goal: str, mode: Mode) -> None:
     scene = boxes(tmp_path, goal)
-    found = scene.plan(mode=mode, engine="none").outcome  # type: ignore[arg-type]
+    found = scene.plan(mode=mode, engine="none").outcome
     assert found.plan is not None and found.plan.length == {1: 1}
     assert validate(scene.problem, found.plan) == []
 
@@ -75,3 +76,28 @@ def test_a_goal_may_use_a_behaviour_whose_change_no_behaviour_takes_back(tmp_pat
     (tmp_path / "w.ttl").write_text(text, encoding="utf-8")
     found = confab.load(tmp_path / "w.ttl").plan(optimal=True).outcome
     assert found.proved and found.bound == 1.0
+
+
+NEIGHBOURS = """
+:NEXT a owl:Class, owl:NamedIndividual, c:SituationType ; c:valueProperty :next .
+:Box rdfs:subClassOf :NEXT ; c:hasSituationType :NEXT .
+:next a owl:ObjectProperty, owl:FunctionalProperty, owl:NamedIndividual ; rdfs:domain :Box ; rdfs:range :NEXT .
+:box1 :next :box2 . :box2 :next :box1 .
+:beside a owl:NamedIndividual, c:AllOf ; c:condition :next1, :openy ; c:weight 5.0 .
+:y a owl:NamedIndividual, c:Variable ; c:termType :Box .
+:next1 a owl:NamedIndividual, c:ValueCondition ; c:about :box1 ; c:situationType :NEXT ; c:value :y .
+:openy a owl:NamedIndividual, c:ValueCondition ; c:about :y ; c:situationType :LID ; c:value :open .
+:beside2 a owl:NamedIndividual, c:Witness ; c:witness :z ; c:condition :same, :nextz, :openy .
+:z a owl:NamedIndividual, c:Variable ; c:termType :Box .
+:nextz a owl:NamedIndividual, c:ValueCondition ; c:about :z ; c:situationType :NEXT ; c:value :y .
+:same a owl:NamedIndividual, c:EqualityCondition ; c:about :z ; c:value :box1 .
+"""
+
+
+@pytest.mark.parametrize("mode", ["guarded", "optimal", "paper"])
+@pytest.mark.parametrize("goal", [":beside", ":beside2"])
+def test_a_goal_may_be_about_an_individual_that_its_conditions_determine(tmp_path: Path, goal: str, mode: Mode) -> None:
+    (tmp_path / "w.ttl").write_text(BOXES.replace("GOALS", goal) + NEIGHBOURS, encoding="utf-8")
+    found = confab.load(tmp_path / "w.ttl").plan(mode=mode, engine="none").outcome
+    assert found.plan is not None
+    assert [step.arguments for step in found.plan.steps] == [("box2", "open")]
