@@ -17,8 +17,8 @@ from confab.planner.plan_costs import cost_of
 from confab.reasoner.generate import write_scene
 from confab.reasoner.graph.knowledge import load
 from confab.reasoner.pddl.exporting import to_pddl
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.problem import read
-from confab.reasoner.symbols import Problem
 
 HERE = Path(__file__).parent
 SHORT, LONG, PROVING = 60, 300, 20

@@ -31,8 +31,9 @@ from confab.reasoner.graph.knowledge import load
 from confab.reasoner.pddl.exporting import to_pddl
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.problem import read
-from confab.reasoner.symbols import TRUE, Problem, Symbol
+from confab.reasoner.symbols import TRUE, Symbol
 from worlds.axioms import Plain, axioms
 
 SECONDS = 60.0

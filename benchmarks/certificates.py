@@ -28,7 +28,7 @@ from confab.planner.plan import Limits, Outcome, Status
 from confab.planner.solve import Request, solve
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.language import DomainError
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 from worlds.agreement import solvable
 from worlds.false_certificates import corrupted
 from worlds.families import random_table

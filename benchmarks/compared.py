@@ -24,7 +24,7 @@ from confab.ontology import scenes
 from confab.planner.hierarchical.planner import plan
 from confab.planner.plan import Limits
 from confab.planner.validation import validate
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 from worlds.families import family, random_table
 from worlds.hierarchies import hierarchy
 

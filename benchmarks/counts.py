@@ -16,7 +16,7 @@ import confab
 from confab.ontology import scenes
 from confab.planner.plan import Outcome
 from confab.reasoner.generate import write_scene
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 
 FAMILIES = ("served", "handover", "swap", "rotate", "full", "blocked")
 SIZES, SEED = (4, 10, 20, 50), 100

@@ -34,8 +34,9 @@ from confab.planner.timed.schedules import ActorChoices, durations_with, least, 
 from confab.planner.timed.validation import validate_timed
 from confab.planner.validation import BehaviorReader, LoggedState
 from confab.reasoner.graph.knowledge import load
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.problem import read
-from confab.reasoner.symbols import Problem, Symbol, Times
+from confab.reasoner.symbols import Symbol, Times
 from confab.reasoner.timing import only_during
 from confab.scene import scenes
 from worlds.deliveries import deliveries

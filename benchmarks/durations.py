@@ -18,7 +18,7 @@ from confab.planner.timed.call import in_time
 from confab.planner.timed.dispatch import Dispatch, simulated
 from confab.planner.timed.measuring import measured, with_durations
 from confab.reasoner.memory.experience import Statistics
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 from worlds.families import family
 
 EPISODES, WORLDS, SLOWER = 10, 10, Fraction(3, 2)

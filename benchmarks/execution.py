@@ -33,8 +33,9 @@ from confab.planner.plan import Limits, Plan, Step
 from confab.planner.plan_costs import cost_of
 from confab.reasoner.generate import write_scene
 from confab.reasoner.graph.knowledge import load
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.problem import read
-from confab.reasoner.symbols import FALSE, Fact, Problem, SituationType, State, Symbol
+from confab.reasoner.symbols import FALSE, Fact, SituationType, State, Symbol
 from confab.scene import Scene
 from worlds.trials import Trial, rest_after
 

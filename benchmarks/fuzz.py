@@ -45,7 +45,7 @@ from benchmarks._processes import fork
 from benchmarks.broken_inputs import DOMAINS, HERE, TARGETS, Arguments
 from benchmarks.broken_worlds import WORLDS
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 
 if TYPE_CHECKING:
     from confab.planning import Result

@@ -14,7 +14,7 @@ from time import process_time
 from confab.planner.hierarchical.planner import plan as default_plan
 from confab.planner.paper.hierarchy import plan as paper_plan
 from confab.planner.plan import Limits, Outcome, Plan, Status
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 from worlds.agreement import complaints, on_top, solvable
 from worlds.hierarchies import hierarchy
 

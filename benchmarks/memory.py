@@ -35,7 +35,7 @@ from confab.reasoner.names import Names
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse_files
 from confab.reasoner.pddl.words import PddlError
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 from worlds.lessons import backwards, problem, taught
 from worlds.memories import load, save
 

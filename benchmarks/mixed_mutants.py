@@ -36,7 +36,7 @@ from benchmarks.mixed import SHARES
 from benchmarks.mutants import LIBRARIES, ROOT, Instead, faults, meaning
 from confab.planner.certificates import Certificate
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 from confab.scene import Scene, load
 from worlds import judging
 from worlds.false_certificates import accepted, corrupted, of_a_task_with_a_plan

@@ -46,8 +46,8 @@ from confab.reasoner.generate import write_scene
 from confab.reasoner.graph.knowledge import load
 from confab.reasoner.limits import LimitError
 from confab.reasoner.memory.experience import Experience, Method
+from confab.reasoner.problem import Domain, Problem
 from confab.reasoner.reading.problem import read
-from confab.reasoner.symbols import Domain, Problem
 from worlds.families import family as packed
 from worlds.families import random_table
 from worlds.lessons import problem as lesson

@@ -7,8 +7,8 @@ from dataclasses import replace
 import confab
 from confab.planner.plan import Limits, Outcome
 from confab.planner.solve import Request, solve
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.quantification import quantify
-from confab.reasoner.symbols import Problem
 
 EPISODES = 5
 FLAT = 200_000

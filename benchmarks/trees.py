@@ -22,7 +22,8 @@ from confab.planner.acting.world import WorldReport
 from confab.planner.behavior_tree import Situation
 from confab.planner.plan import Plan, Step
 from confab.planner.validation import open_goals
-from confab.reasoner.symbols import FALSE, Problem
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE
 from confab.trees import Tree, behavior_tree, export_trees, filled, ticked
 
 NAMES = (

@@ -17,7 +17,8 @@ from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
 from confab.reasoner.limits import Deadline
 from confab.reasoner.names import nearest
 from confab.reasoner.possible import ImpossibleStateError
-from confab.reasoner.symbols import FALSE, TRUE, Problem
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, TRUE
 
 
 class HasPlan(Protocol):

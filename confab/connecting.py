@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from confab.planner.acting.retries import RetryPolicy
 from confab.reasoner.embodiment.interfaces import Interface, read_interface
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 from confab.sim.robots.adapter import InterfaceWorld
 from confab.sim.robots.transport import RobotError, Transport
 from confab.sim.robots.transports import TRANSPORTS

@@ -28,7 +28,8 @@ from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import Deadline, overtime, within
 from confab.reasoner.names import nearest
 from confab.reasoner.pddl.exporting import to_pddl
-from confab.reasoner.symbols import Problem, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Symbol
 from confab.reasoner.workers import CPU_SECONDS, WorkerError, call, end, start
 
 if TYPE_CHECKING:

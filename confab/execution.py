@@ -44,8 +44,9 @@ from confab.reasoner.limits import within
 from confab.reasoner.memory.links import Links
 from confab.reasoner.names import RightNames, right_names
 from confab.reasoner.possible import violated
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.goals import some_of, with_goals
-from confab.reasoner.symbols import Fact, Problem, Symbol, Times
+from confab.reasoner.symbols import Fact, Symbol, Times
 from confab.timing import has_times
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from confab.planner.experience.instances import RuleInstance
 from confab.planner.hierarchical.call import Call, compiled
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.memory.experience import ITSELF, Ground, RoleFact, Tally
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -13,9 +13,10 @@ from confab.planner.transitions import PythonWriter, Table, key_of
 from confab.reasoner.graph.knowledge import BASE, DERIVED, SCENE, KnowledgeGraph
 from confab.reasoner.limits import check
 from confab.reasoner.names import local_name
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.problem import Reading
 from confab.reasoner.reading.restating import said, value_properties
-from confab.reasoner.symbols import TRUE, Fact, Problem, Symbol
+from confab.reasoner.symbols import TRUE, Fact, Symbol
 from confab.reasoner.vocabulary import CORE, TYPE
 
 DEFINED = """

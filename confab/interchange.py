@@ -13,7 +13,8 @@ from confab.planner.certificates import Certificate, certificate_from, certifica
 from confab.planner.plan import Outcome, Plan, Status, Step
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.names import nearest
-from confab.reasoner.symbols import Behavior, Fact, Problem, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Behavior, Fact, Symbol
 
 if TYPE_CHECKING:
     from confab.planner.acting.episode import Episode

@@ -15,8 +15,9 @@ from confab.planner.acting.symbolic_world import place_symbols, with_individual
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.names import nearest
 from confab.reasoner.possible import PLACE, refuse_derived, refuse_impossible
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.goals import parse_fact
-from confab.reasoner.symbols import Fact, Problem, Symbol
+from confab.reasoner.symbols import Fact, Symbol
 
 FORMS = (
     "'after=28 cup2 LOCATION location8', 'after=28 goal FACT', 'after=28 drop-goal cup2 LOCATION', 'after=28 remove cup2', "

@@ -18,9 +18,10 @@ from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, text
 from confab.reasoner.kinds import SAVED, stamped
 from confab.reasoner.limits import checked, within
 from confab.reasoner.names import GUESSING, Named, Names, RightNames, local_name, nearest, right_names
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.goals import parse_fact, some_of
 from confab.reasoner.reading.problem import Reading, read, read_names
-from confab.reasoner.symbols import TRUE, Behavior, Fact, Problem
+from confab.reasoner.symbols import TRUE, Behavior, Fact
 from confab.table import Table
 
 if TYPE_CHECKING:

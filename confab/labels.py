@@ -15,8 +15,9 @@ from confab.planner.plan import Step
 from confab.reasoner.derivation import conditions_of_goal
 from confab.reasoner.graph.knowledge import KnowledgeGraph, text
 from confab.reasoner.names import Names, brief, known_as
+from confab.reasoner.problem import Domain, Problem
 from confab.reasoner.sentences import denied, said
-from confab.reasoner.symbols import FALSE, TRUE, Behavior, Condition, Domain, Fact, Problem, Symbol
+from confab.reasoner.symbols import FALSE, TRUE, Behavior, Condition, Fact, Symbol
 
 LABELS = """SELECT ?of ?label (LANG(?label) AS ?language) WHERE {{
   VALUES ?of {{ {those} }} ?of rdfs:label ?label }} ORDER BY ?of ?language ?label"""

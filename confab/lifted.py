@@ -8,8 +8,9 @@ from collections.abc import Mapping, Sequence
 from confab.labels import Labels
 from confab.reasoner.amounts import LESS, MORE
 from confab.reasoner.memory.experience import GoalKind, LearnedItem, LearnedOrder, LearnedRule, Method
+from confab.reasoner.problem import Domain
 from confab.reasoner.sentences import said as plainly
-from confab.reasoner.symbols import Condition, Domain, Fact, RelationCondition, Symbol, Witness
+from confab.reasoner.symbols import Condition, Fact, RelationCondition, Symbol, Witness
 
 MOST_SAID = 6
 """Maximum number of conditions in the sentence about a rule."""

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from confab.physics import Report
     from confab.planner.acting.episode import Episode
     from confab.planner.experience.advice import Advisor
-    from confab.reasoner.symbols import Problem
+    from confab.reasoner.problem import Problem
 
 
 UNTAUGHT = "no step was executed as planned, and no behaviour failed"

@@ -22,8 +22,9 @@ from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse_files
 from confab.reasoner.pddl.turtle import turtle
 from confab.reasoner.pddl.words import PddlError
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.problem import read
-from confab.reasoner.symbols import GroundBehavior, Problem
+from confab.reasoner.symbols import GroundBehavior
 
 Ground: TypeAlias = tuple[str, tuple[str, ...]]
 """The name of a behaviour, and its arguments."""

@@ -35,11 +35,12 @@ from confab.planner.timed.plan import schedule_of
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import Deadline, OutOfTimeError
 from confab.reasoner.memory.links import Links
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.goals import with_goals
 from confab.reasoner.reading.problem import Reading
 from confab.reasoner.reading.relevance import recognise
 from confab.reasoner.refining import never_done, without
-from confab.reasoner.symbols import Behavior, Fact, GroundBehavior, Problem
+from confab.reasoner.symbols import Behavior, Fact, GroundBehavior
 from confab.timing import (
     asks_for_times,
     needs_others_meanwhile,

@@ -26,9 +26,10 @@ from confab.reasoner.kinds import PLAN
 from confab.reasoner.limits import Deadline, within
 from confab.reasoner.memory.links import Links
 from confab.reasoner.names import RightNames, right_names
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.goals import with_goals
 from confab.reasoner.reading.problem import Reading
-from confab.reasoner.symbols import Fact, Problem
+from confab.reasoner.symbols import Fact
 from confab.reasoner.timing import may_overlap_by_need
 from confab.timing import Minimise, lanes, needs_others_meanwhile, schedule_json, with_unit_costs
 

@@ -27,8 +27,9 @@ from confab.planner.acting.episode import (
 from confab.planner.acting.symbolic_world import with_individual
 from confab.planner.plan import Plan, Reason, Step
 from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.goals import parse_fact
-from confab.reasoner.symbols import Problem, Symbol
+from confab.reasoner.symbols import Symbol
 
 if TYPE_CHECKING:
     from confab.execution import Execution

@@ -16,7 +16,8 @@ from confab.planner.acting.world import INTERRUPTED, Guarded, Verdict, World, Wo
 from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.plan import Limits, Step
 from confab.planner.validation import successor
-from confab.reasoner.symbols import FALSE, Problem, State, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, State, Symbol
 
 LOOKS = 5
 """The number of observations for which the latency is measured."""

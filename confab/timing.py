@@ -12,7 +12,7 @@ from confab.planner.plan import Outcome, Status
 from confab.planner.timed.plan import schedule_of
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import Deadline
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 from confab.reasoner.timing import only_during
 
 if TYPE_CHECKING:

@@ -30,8 +30,9 @@ from confab.planner.plan import Plan, Step
 from confab.reasoner.files import check_replaceable, made_folder, write_whole
 from confab.reasoner.kinds import TREE, stamped
 from confab.reasoner.limits import check
+from confab.reasoner.problem import Problem
 from confab.reasoner.sentences import said
-from confab.reasoner.symbols import Condition, Fact, Problem
+from confab.reasoner.symbols import Condition, Fact
 
 RETRIES = 5
 """An exported tree fails after this number of failures; after each earlier failure, it starts again."""

@@ -22,8 +22,9 @@ from confab.reasoner.amounts import written
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import check
 from confab.reasoner.names import known_as, nearest
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.goals import parse_fact, some_of
-from confab.reasoner.symbols import Behavior, Fact, Problem, Symbol
+from confab.reasoner.symbols import Behavior, Fact, Symbol
 from confab.worded import worded_behavior, worded_fact
 
 MOST_TOLD = 12

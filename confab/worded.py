@@ -6,7 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from itertools import product
 
 from confab.labels import Labels
-from confab.reasoner.symbols import FALSE, TRUE, Behavior, Fact, Problem, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, TRUE, Behavior, Fact, Symbol
 
 
 def worded_behavior(problem: Problem, labels: Labels, text: str) -> tuple[Behavior, Mapping[str, str]] | None:

@@ -11,7 +11,8 @@ from confab.planner.derived_facts import CompiledRules
 from confab.planner.transitions import PythonWriter, Table, arguments_of, key_of
 from confab.reasoner.amounts import Amount, inside
 from confab.reasoner.limits import check, checked
-from confab.reasoner.symbols import Comparison, Condition, Fact, Problem, State, Symbol, ValueCondition
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Comparison, Condition, Fact, State, Symbol, ValueCondition
 
 
 @dataclass(frozen=True, order=True)

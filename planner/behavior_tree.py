@@ -31,7 +31,8 @@ from confab.planner.plan import Plan, Step
 from confab.planner.validation import BehaviorReader, LoggedState, followed, unmet_goals
 from confab.reasoner.amounts import meets
 from confab.reasoner.limits import check
-from confab.reasoner.symbols import Condition, Fact, Problem, State, Symbol, ValueCondition
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Condition, Fact, State, Symbol, ValueCondition
 
 
 @dataclass(frozen=True)

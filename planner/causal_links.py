@@ -24,8 +24,10 @@ from confab.planner.checked_conditions import Arguments
 from confab.planner.plan import Plan, Step
 from confab.planner.validation import BehaviorReader, Cell, LoggedState
 from confab.reasoner.amounts import meets
+from confab.reasoner.language import substituted
 from confab.reasoner.limits import check
-from confab.reasoner.symbols import FALSE, TRUE, Condition, Fact, Problem, Symbol, ValueCondition, substituted
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, TRUE, Condition, Fact, Symbol, ValueCondition
 
 Path = tuple[int, ...]
 T = TypeVar("T")

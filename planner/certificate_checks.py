@@ -24,7 +24,8 @@ from confab.planner.checked_conditions import own_variables, undetermined, unifi
 from confab.planner.possibilities import Beginning, FactEvaluation, Lowest, Range, WorkLimitError
 from confab.reasoner.aggregates.dependencies import in_order
 from confab.reasoner.amounts import bounds, number, written
-from confab.reasoner.symbols import FALSE, TRUE, Behavior, Fact, Problem, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, TRUE, Behavior, Fact, Symbol
 from confab.reasoner.timing import by_events
 
 OTHER, ANY, KEPT = "", "?", "="

@@ -22,7 +22,8 @@ from confab.planner.possibilities import (
     compared,
 )
 from confab.reasoner.amounts import MORE, bounds, terms_of, towards, written
-from confab.reasoner.language import terms, walk
+from confab.reasoner.language import substituted, terms, walk
+from confab.reasoner.problem import Problem
 from confab.reasoner.sentences import an, said
 from confab.reasoner.symbols import (
     FALSE,
@@ -35,13 +36,11 @@ from confab.reasoner.symbols import (
     Effect,
     EqualityCondition,
     Fact,
-    Problem,
     RelationCondition,
     Rule,
     Symbol,
     ValueCondition,
     Witness,
-    substituted,
 )
 
 WORK = 300_000

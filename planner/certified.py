@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from confab.planner.plan import Outcome, Reason, Status, UngroundableError
 from confab.reasoner.limits import OutOfTimeError, current
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 from confab.reasoner.timing import by_events
 
 if TYPE_CHECKING:

@@ -45,7 +45,8 @@ from confab.planner.checked_conditions import own_variables, unified, variables
 from confab.planner.possibilities import FactEvaluation, Lowest, NoTimeLeftError, Range, WorkLimitError
 from confab.planner.validation import BehaviorReader, LoggedState
 from confab.reasoner.amounts import meets, number, written
-from confab.reasoner.symbols import FALSE, TRUE, Behavior, Effect, Fact, Problem, State, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, TRUE, Behavior, Effect, Fact, State, Symbol
 
 WORK = 3_000_000
 """Maximum work to find a certificate: the number of tested conditions plus the number of behaviours that are tried in cases."""

@@ -11,6 +11,7 @@ from typing import Protocol, TypeAlias
 
 from confab.planner.checked_amounts import compares
 from confab.reasoner.amounts import terms_of
+from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     FALSE,
     AnyOf,
@@ -19,7 +20,6 @@ from confab.reasoner.symbols import (
     Comparison,
     Condition,
     EqualityCondition,
-    Problem,
     RelationCondition,
     ValueCondition,
     ValueEffect,

@@ -16,6 +16,7 @@ from confab.reasoner.aggregates.dependencies import read_by
 from confab.reasoner.amounts import Amount, inside, written
 from confab.reasoner.closure import closure
 from confab.reasoner.derivation import strata
+from confab.reasoner.language import substituted
 from confab.reasoner.symbols import (
     Aggregate,
     AnyOf,
@@ -25,7 +26,6 @@ from confab.reasoner.symbols import (
     Rule,
     ValueCondition,
     Witness,
-    substituted,
 )
 
 Cell: TypeAlias = "tuple[str, tuple[str, ...]]"

@@ -22,18 +22,18 @@ from confab.planner.plan_costs import cost_of
 from confab.planner.solve import Request, solve
 from confab.planner.validation import BehaviorReader, LoggedState, followed, successor, validate
 from confab.reasoner.amounts import Amount
+from confab.reasoner.language import substituted
+from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     AnyOf,
     Behavior,
     Comparison,
     Condition,
     EqualityCondition,
-    Problem,
     RelationCondition,
     State,
     Symbol,
     ValueCondition,
-    substituted,
 )
 
 Ask = Callable[[Problem], Outcome]

@@ -17,19 +17,10 @@ from itertools import combinations
 from confab.planner.checked_conditions import Bindings, unified
 from confab.planner.plan import Broken, Left, Plan, Step
 from confab.planner.validation import BehaviorReader, Cell, LoggedState, stretches
-from confab.reasoner.language import is_variable, mentions
+from confab.reasoner.language import is_variable, mentions, substituted
+from confab.reasoner.problem import Problem
 from confab.reasoner.sentences import said
-from confab.reasoner.symbols import (
-    AmountEffect,
-    Behavior,
-    Condition,
-    Fact,
-    Problem,
-    Symbol,
-    ValueCondition,
-    ValueEffect,
-    substituted,
-)
+from confab.reasoner.symbols import AmountEffect, Behavior, Condition, Fact, Symbol, ValueCondition, ValueEffect
 
 MOST_LACKING = 4
 """Maximum number of conditions that are removed together to find the failing conditions of a behaviour."""

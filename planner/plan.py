@@ -16,8 +16,9 @@ from confab.planner.certificates import Certificate
 from confab.reasoner.amounts import written
 from confab.reasoner.limits import current
 from confab.reasoner.names import RightNames, brief, known_as, right_names
+from confab.reasoner.problem import Problem
 from confab.reasoner.sentences import said
-from confab.reasoner.symbols import Condition, Fact, Problem, State, Symbol
+from confab.reasoner.symbols import Condition, Fact, State, Symbol
 
 if TYPE_CHECKING:
     import networkx

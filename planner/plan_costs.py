@@ -12,7 +12,7 @@ from typing import Protocol
 from confab.planner.plan import Plan, Step
 from confab.planner.validation import BehaviorReader, LoggedState
 from confab.reasoner.limits import checked
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 
 TRIFLE = 2.0**-20
 """Cost added to each primitive when plans are compared; of two plans with equal costs, the shorter plan is then cheaper."""

@@ -28,6 +28,7 @@ from confab.reasoner.amounts import (
     situations_in,
 )
 from confab.reasoner.limits import current
+from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -38,7 +39,6 @@ from confab.reasoner.symbols import (
     Comparison,
     Condition,
     EqualityCondition,
-    Problem,
     RelationCondition,
     Symbol,
     ValueCondition,

@@ -31,7 +31,8 @@ from confab.planner.plan_costs import cost_of
 from confab.planner.validation import unmet_goals
 from confab.reasoner.derivation import conditions_of_goal
 from confab.reasoner.limits import LimitError, OutOfTimeError, overtime
-from confab.reasoner.symbols import Fact, Problem, Symbol, Times
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Fact, Symbol, Times
 
 PlanSearch: TypeAlias = "Callable[[Problem], Outcome]"
 Shortener: TypeAlias = "Callable[[Problem, Outcome, bool], Outcome]"

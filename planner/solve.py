@@ -30,7 +30,8 @@ from confab.planner.plan_costs import cost_of
 from confab.planner.timed.plan import schedule_of
 from confab.planner.validation import validate
 from confab.reasoner.limits import Deadline, OutOfTimeError, overtime, within
-from confab.reasoner.symbols import GroundBehavior, Problem
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import GroundBehavior
 from confab.reasoner.timing import by_events, judged_by_events, may_overlap_by_need, only_during
 
 if TYPE_CHECKING:

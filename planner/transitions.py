@@ -26,6 +26,7 @@ from confab.planner.generated import code, identifier, key_written, tuple_writte
 from confab.reasoner.amounts import terms_of
 from confab.reasoner.language import DomainError, needs, nothing_determines
 from confab.reasoner.limits import check
+from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -36,7 +37,6 @@ from confab.reasoner.symbols import (
     Comparison,
     Condition,
     EqualityCondition,
-    Problem,
     RelationCondition,
     State,
     Symbol,

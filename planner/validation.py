@@ -27,17 +27,8 @@ from confab.planner.checked_definitions import BoundedTotals, DefinedValues, Tot
 from confab.planner.plan import Plan, Step
 from confab.reasoner.amounts import Quantity, meets
 from confab.reasoner.limits import check
-from confab.reasoner.symbols import (
-    FALSE,
-    TRUE,
-    Behavior,
-    ClassCondition,
-    Condition,
-    Fact,
-    Problem,
-    State,
-    Symbol,
-)
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, TRUE, Behavior, ClassCondition, Condition, Fact, State, Symbol
 
 Cell: TypeAlias = "tuple[str, Arguments]"
 """A cell of a state: a symbol as its situation type and arguments."""

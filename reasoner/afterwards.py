@@ -16,7 +16,8 @@ from itertools import count, product
 from typing import TypeAlias
 
 from confab.reasoner.amounts import Amount, Calculation, Expression, after_effect, put_in, situations_in, terms_of
-from confab.reasoner.language import groups, is_variable, mentions, situations_of, walk
+from confab.reasoner.effects import made_of
+from confab.reasoner.language import groups, is_variable, mentions, situations_of, substituted, walk
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -33,8 +34,6 @@ from confab.reasoner.symbols import (
     ValueCondition,
     ValueEffect,
     Witness,
-    made_of,
-    substituted,
 )
 
 Simplified: TypeAlias = "Condition | bool"

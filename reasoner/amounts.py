@@ -121,9 +121,14 @@ def terms_of(expression: Expression) -> tuple[str, ...]:
     return tuple(t for part in inside(expression) if isinstance(part, Amount | Measure) for t in part.arguments)
 
 
+def amounts_of(expression: Expression) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Return the amounts that an expression reads: their situation types with their terms."""
+    return tuple((part.situation, part.arguments) for part in inside(expression) if isinstance(part, Amount))
+
+
 def situations_in(expression: Expression) -> frozenset[str]:
-    """Return the situation types of all amounts in an expression."""
-    return frozenset(part.situation for part in inside(expression) if isinstance(part, Amount))
+    """Return the situation types of the amounts that an expression reads."""
+    return frozenset(situation for situation, _ in amounts_of(expression))
 
 
 def put_in(expression: Expression, terms: Mapping[str, str]) -> Expression:

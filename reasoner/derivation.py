@@ -11,16 +11,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from confab.reasoner.amounts import situations_in
 from confab.reasoner.closure import closure
 from confab.reasoner.language import groups
+from confab.reasoner.problem import Domain, Problem
 from confab.reasoner.symbols import (
     FALSE,
     AnyOf,
     ClassCondition,
     Comparison,
     Condition,
-    Domain,
     EqualityCondition,
     Fact,
-    Problem,
     RelationCondition,
     Rule,
     Symbol,

@@ -5,10 +5,10 @@ Code for a new kind of condition belongs into this module and into the checker.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 
-from confab.reasoner.amounts import Measure, inside, situations_in, terms_of
+from confab.reasoner.amounts import Measure, amounts_of, inside, put_in, terms_of
 from confab.reasoner.symbols import (
     AnyOf,
     Behavior,
@@ -67,15 +67,46 @@ def terms(condition: Condition) -> tuple[str, ...]:
             return ()
 
 
+def symbols_of(condition: Condition) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Return the situation types that a condition reads, each with its terms, without those of nested conditions."""
+    match condition:
+        case ValueCondition(situation, arguments):
+            return ((situation, arguments),)
+        case Comparison(one, _, other):
+            return (*amounts_of(one), *amounts_of(other))
+        case RelationCondition() | ClassCondition() | EqualityCondition() | Witness() | AnyOf():
+            return ()
+
+
 def situations_of(condition: Condition) -> frozenset[str]:
     """Return the situation types of a condition, without the situation types of nested conditions."""
+    return frozenset(situation for situation, _ in symbols_of(condition))
+
+
+def substituted(condition: Condition, terms: Mapping[str, str]) -> Condition:
+    """Return a condition in which `terms` maps terms to their replacements."""
+
+    def put(names: Sequence[str]) -> tuple[str, ...]:
+        return tuple(terms.get(name, name) for name in names)
+
     match condition:
-        case ValueCondition(situation):
-            return frozenset({situation})
-        case Comparison(one, _, other):
-            return situations_in(one) | situations_in(other)
-        case RelationCondition() | ClassCondition() | EqualityCondition() | Witness() | AnyOf():
-            return frozenset()
+        case ValueCondition(situation, arguments, value, negated):
+            return ValueCondition(situation, put(arguments), terms.get(value, value), negated)
+        case RelationCondition(relation, arguments, negated):
+            return RelationCondition(relation, put(arguments), negated)
+        case ClassCondition(term, kind, negated):
+            return ClassCondition(terms.get(term, term), kind, negated)
+        case EqualityCondition(left, right, negated):
+            return EqualityCondition(terms.get(left, left), terms.get(right, right), negated)
+        case Witness(variable, kind, conditions, negated):
+            own = f"{variable}_inside" if variable in terms.values() else variable  # avoids variable capture
+            inner = {**terms, variable: own}
+            return Witness(own, kind, tuple(substituted(c, inner) for c in conditions), negated)
+        case AnyOf(alternatives, negated, constraint):
+            groups = tuple(tuple(substituted(c, terms) for c in group) for group in alternatives)
+            return AnyOf(groups, negated, constraint)
+        case Comparison(one, sign, other, negated):
+            return Comparison(put_in(one, terms), sign, put_in(other, terms), negated)
 
 
 def measured(behavior: Behavior) -> Iterator[Measure]:

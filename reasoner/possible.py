@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from confab.reasoner.amounts import DECIMAL, Quantity, written
-from confab.reasoner.symbols import FALSE, TRUE, Constraint, Domain, Fact, Problem, State, Symbol, ValueCondition
+from confab.reasoner.problem import Domain, Problem
+from confab.reasoner.symbols import FALSE, TRUE, Constraint, Fact, State, Symbol, ValueCondition
 
 PLACE, HELD, POSITION = "perceive_place", "perceive_held", "perceive_hand_position"
 """Perceivers of an object's place, of the object in a hand, and of a hand's position."""

@@ -7,7 +7,8 @@ from dataclasses import replace
 from fractions import Fraction
 
 from confab.reasoner.language import situations_of, walk
-from confab.reasoner.symbols import FALSE, NEVER, AmountEffect, Behavior, Problem, ValueEffect
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, NEVER, AmountEffect, Behavior, ValueEffect
 
 
 def never_done(problem: Problem) -> Iterator[tuple[Behavior, str]]:

@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from confab.reasoner.symbols import FALSE, TRUE, AnyOf, EqualityCondition, Fact, Problem, ValueCondition
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, TRUE, AnyOf, EqualityCondition, Fact, ValueCondition
 
 
 @dataclass(frozen=True, order=True)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from itertools import count
 
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, written
+from confab.reasoner.language import substituted
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -21,7 +22,6 @@ from confab.reasoner.symbols import (
     Symbol,
     ValueCondition,
     Witness,
-    substituted,
 )
 
 Words = Callable[[Fact | str], str]

@@ -23,7 +23,9 @@ from confab.reasoner.amounts import (
     situations_in,
     with_amounts,
 )
+from confab.reasoner.effects import made_of
 from confab.reasoner.language import terms, walk
+from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     FALSE,
     NEVER,
@@ -34,14 +36,12 @@ from confab.reasoner.symbols import (
     Condition,
     Effect,
     Parameter,
-    Problem,
     SituationType,
     Span,
     Timing,
     ValueCondition,
     ValueEffect,
     Witness,
-    made_of,
 )
 
 

@@ -22,7 +22,8 @@ from confab.planner.plan import Step
 from confab.planner.timed.dispatch import Dispatch
 from confab.reasoner.embodiment.values import Body
 from confab.reasoner.possible import refuse_impossible
-from confab.reasoner.symbols import Fact, Problem, State
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Fact, State
 from confab.sim.bodies import KINDS
 from confab.sim.engine import Engine, SimulatedBody
 from confab.sim.interventions import DISTURBERS, HANDLED, move, put_box

@@ -16,7 +16,8 @@ import pybullet
 from confab.planner.acting.discovery import Discovery
 from confab.planner.acting.symbolic_world import met, shared_kinds
 from confab.reasoner.embodiment.values import PerceiverUse, Place
-from confab.reasoner.symbols import Fact, Problem, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Fact, Symbol
 from confab.sim.attempt import CLOSE
 from confab.sim.bodies import outer_radius
 from confab.sim.engine import NEAR_PLACE

@@ -17,7 +17,7 @@ import pybullet
 from confab.planner.acting.schedule import WorkerSlot, partial_order, ready, urgency_of, worker_of, workers_of
 from confab.planner.acting.world import INTERRUPTED
 from confab.planner.plan import Step
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 from confab.sim.engine import Engine
 from confab.sim.verdict import SkillError, Verdict
 from confab.sim.world import PhysicsWorld

@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 from confab.planner.validation import successor
 from confab.reasoner.embodiment.values import Embodiment
 from confab.reasoner.names import brief, known_as
-from confab.reasoner.symbols import FALSE, TRUE, Fact, PrimitiveStep, Problem, State
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, TRUE, Fact, PrimitiveStep, State
 from confab.sim.engine import Clock, Engine
 from confab.sim.perception import perceiver
 from confab.sim.staging import Perturbation

@@ -14,7 +14,8 @@ from confab.planner.levels import levels_left
 from confab.planner.plan import Outcome, Status
 from confab.planner.validation import BehaviorReader, LoggedState, validate
 from confab.reasoner.amounts import meets
-from confab.reasoner.symbols import FALSE, Problem, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, Symbol
 from worlds.writing import quantified
 
 State = Mapping[Symbol, str]

@@ -7,7 +7,7 @@ from dataclasses import replace
 from random import Random
 
 from confab.planner.plan import Plan, Step, renumbered
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 from worlds.interpreter import Interpreter
 
 

@@ -6,13 +6,12 @@ from fractions import Fraction
 from random import Random
 
 from confab.reasoner.amounts import Expression, Measure
+from confab.reasoner.problem import Domain, Problem
 from confab.reasoner.symbols import (
     Behavior,
     Condition,
-    Domain,
     EqualityCondition,
     Parameter,
-    Problem,
     SituationType,
     Span,
     Symbol,

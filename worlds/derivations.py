@@ -15,9 +15,10 @@ from confab.planner.transitions import Table, key_of
 from confab.planner.validation import LoggedState
 from confab.reasoner.amounts import written
 from confab.reasoner.graph.knowledge import load
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.problem import read
 from confab.reasoner.reading.rows import decimal
-from confab.reasoner.symbols import TRUE, Problem, Symbol
+from confab.reasoner.symbols import TRUE, Symbol
 from worlds.entailed import CONCLUDED, DEFINED, asserted, domain, entailed, plainly, random_state
 
 SITUATIONS = {"liesIn": "LIES_IN", "cleanliness": "CLEANLINESS", "holds": "HOLDS", "weight": "WEIGHT"}

@@ -13,7 +13,8 @@ from random import Random
 from confab.planner.certificate_checks import is_bounded, refusal
 from confab.planner.certificates import Certificate
 from confab.reasoner.amounts import Quantity, written
-from confab.reasoner.symbols import FALSE, TRUE, Fact, Problem, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, TRUE, Fact, Symbol
 from worlds.interpreter import Interpreter, State, TooManyStatesError
 
 MOST_STATES = 600

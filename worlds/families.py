@@ -8,8 +8,9 @@ from dataclasses import replace
 from functools import lru_cache
 
 from confab.reasoner.graph.knowledge import load
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.problem import read
-from confab.reasoner.symbols import Problem, Symbol
+from confab.reasoner.symbols import Symbol
 
 FAMILIES = ("served", "swap", "rotate", "full", "packed", "handover", "blocked")
 

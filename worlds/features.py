@@ -8,6 +8,7 @@ from itertools import combinations
 
 from confab.reasoner.amounts import Calculation, Expression, inside
 from confab.reasoner.derivation import TASK
+from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     FALSE,
     AmountEffect,
@@ -18,7 +19,6 @@ from confab.reasoner.symbols import (
     Condition,
     Effect,
     EqualityCondition,
-    Problem,
     RelationCondition,
     ValueCondition,
     ValueEffect,

@@ -14,6 +14,7 @@ from itertools import product
 from math import prod
 from random import Random
 
+from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -22,7 +23,6 @@ from confab.reasoner.symbols import (
     ClassCondition,
     Condition,
     EqualityCondition,
-    Problem,
     RelationCondition,
     SituationType,
     ValueEffect,

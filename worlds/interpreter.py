@@ -23,6 +23,7 @@ from confab.reasoner.aggregates.dependencies import in_order, read_by
 from confab.reasoner.amounts import LARGEST, Amount, Calculation, Expression, Measure, terms_of
 from confab.reasoner.derivation import strata
 from confab.reasoner.language import situations_of, walk
+from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -35,7 +36,6 @@ from confab.reasoner.symbols import (
     Condition,
     EqualityCondition,
     Parameter,
-    Problem,
     RelationCondition,
     Symbol,
     ValueCondition,

@@ -33,9 +33,10 @@ from confab.reasoner.amounts import written
 from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph
 from confab.reasoner.language import DomainError
 from confab.reasoner.limits import LimitError
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading import relevance
 from confab.reasoner.reading.problem import Reading, read_names
-from confab.reasoner.symbols import FALSE, Problem, Symbol
+from confab.reasoner.symbols import FALSE, Symbol
 from confab.scene import Scene, load
 from worlds.corrupted import corrupted, numbered, random_steps
 from worlds.false_certificates import accepted, of_a_task_with_a_plan

@@ -12,6 +12,7 @@ from itertools import product
 from random import Random
 
 from confab.reasoner.amounts import COMPARING, OPERATIONS, Amount, Calculation, Expression, Measure, Quantity, written
+from confab.reasoner.problem import Domain, Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -21,10 +22,8 @@ from confab.reasoner.symbols import (
     ClassCondition,
     Comparison,
     Condition,
-    Domain,
     EqualityCondition,
     Parameter,
-    Problem,
     RelationCondition,
     Rule,
     SituationType,

@@ -13,9 +13,10 @@ from confab.planner.experience.lessons import teach
 from confab.reasoner.generate import generate
 from confab.reasoner.graph.knowledge import load
 from confab.reasoner.memory.experience import Experience, LearnedRule
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.problem import Reading, read
 from confab.reasoner.reading.relevance import recognise
-from confab.reasoner.symbols import Problem, ValueCondition
+from confab.reasoner.symbols import ValueCondition
 
 
 def as_it_is(text: str) -> str:

@@ -22,6 +22,7 @@ from confab.reasoner.amounts import Amount, Expression, Quantity, bounds, writte
 from confab.reasoner.closure import closure
 from confab.reasoner.derivation import TASK, circular
 from confab.reasoner.language import terms, walk
+from confab.reasoner.problem import Domain, Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -32,10 +33,8 @@ from confab.reasoner.symbols import (
     Comparison,
     Condition,
     Constraint,
-    Domain,
     EqualityCondition,
     Parameter,
-    Problem,
     RelationCondition,
     Rule,
     SituationType,

@@ -13,15 +13,8 @@ from random import Random
 from typing import Any, TypeAlias
 
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, Quantity, written
-from confab.reasoner.symbols import (
-    AmountEffect,
-    Behavior,
-    Comparison,
-    EqualityCondition,
-    Parameter,
-    Problem,
-    SituationType,
-)
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import AmountEffect, Behavior, Comparison, EqualityCondition, Parameter, SituationType
 from worlds.writing import becomes, has, world
 
 State: TypeAlias = Any

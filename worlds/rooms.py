@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import random
 
+from confab.reasoner.problem import Domain, Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AnyOf,
     Behavior,
-    Domain,
     Parameter,
-    Problem,
     RelationCondition,
     SituationType,
     Symbol,

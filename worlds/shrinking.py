@@ -7,15 +7,14 @@ from dataclasses import fields, is_dataclass, replace
 from time import process_time
 from typing import Any
 
+from confab.reasoner.problem import Domain, Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AnyOf,
     Behavior,
     Condition,
-    Domain,
     Effect,
-    Problem,
     Rule,
     SituationType,
     Symbol,

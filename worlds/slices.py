@@ -15,9 +15,9 @@ from confab.reasoner.aggregates.dependencies import read_by
 from confab.reasoner.amounts import situations_in
 from confab.reasoner.graph.knowledge import KnowledgeGraph
 from confab.reasoner.language import situations_of, walk
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading import relevance
 from confab.reasoner.reading.problem import Reading
-from confab.reasoner.symbols import Problem
 from worlds.interpreter import Interpreter, State, TooManyStatesError
 
 

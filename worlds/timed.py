@@ -18,6 +18,7 @@ from confab.planner.timed.plan import TimedPlan
 from confab.reasoner.aggregates.compiling import compiled
 from confab.reasoner.aggregates.totals import with_totals
 from confab.reasoner.amounts import Amount, Quantity
+from confab.reasoner.problem import Domain, Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -26,10 +27,8 @@ from confab.reasoner.symbols import (
     Behavior,
     Comparison,
     Condition,
-    Domain,
     Effect,
     Parameter,
-    Problem,
     SituationType,
     Span,
     Symbol,

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.plan import Plan, Step
 from confab.planner.validation import successor
-from confab.reasoner.symbols import Problem, State
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import State
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from confab.planner.validation import BehaviorReader, LoggedState
-from confab.reasoner.symbols import FALSE, TRUE, AnyOf, Behavior, Condition, Problem, Symbol, ValueCondition, Witness
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, TRUE, AnyOf, Behavior, Condition, Symbol, ValueCondition, Witness
 
 Codes = NDArray[np.uint64]
 UNSEEN, DEAD, ALIVE = 0, 1, 2

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import product
 
+from confab.reasoner.problem import Domain, Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     Behavior,
     Condition,
-    Domain,
     Parameter,
-    Problem,
     SituationType,
     Symbol,
     ValueCondition,

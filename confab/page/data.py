@@ -26,7 +26,7 @@ from confab.page.timeline import Bar, Timeline, of_episode, of_plan, of_rollout,
 from confab.planner.causal_links import purposes
 from confab.planner.plan import Plan, Step
 from confab.reasoner.graph.knowledge import KnowledgeError, text
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 
 if TYPE_CHECKING:
     from confab.known import Known

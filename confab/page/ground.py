@@ -10,7 +10,7 @@ from math import cos, hypot, sin
 import numpy as np
 
 from confab.reasoner.embodiment.values import Embodiment
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 
 Point = tuple[float, float]
 MOST_SPOTS = 400

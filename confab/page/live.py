@@ -14,7 +14,8 @@ from confab.page.schema import PageData, TimelineRow
 from confab.page.timeline import Bar, Period, Timeline
 from confab.planner.acting.episode import Event
 from confab.planner.plan import Step
-from confab.reasoner.symbols import Problem, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Symbol
 
 
 class Following:

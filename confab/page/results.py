@@ -17,7 +17,8 @@ from confab.page.schema import Alarm, FilmData, GoalData, Tile
 from confab.page.timeline import Timeline
 from confab.planner.plan import Outcome, SoftGoal, Status
 from confab.planner.plan_costs import cost_of
-from confab.reasoner.symbols import FALSE, Fact, Problem
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, Fact
 from confab.show import lengths
 from confab.sim.verdict import CODES
 

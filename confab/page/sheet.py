@@ -21,7 +21,8 @@ from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import LimitError
 from confab.reasoner.names import nearest
 from confab.reasoner.possible import refuse_derived, refuse_impossible
-from confab.reasoner.symbols import FALSE, TRUE, Fact, Problem, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, TRUE, Fact, Symbol
 
 if TYPE_CHECKING:
     from confab.execution import Execution

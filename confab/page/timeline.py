@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 from confab.planner.acting.schedule import worker_of, workers_of
 from confab.planner.plan import Plan, Step
 from confab.planner.validation import successor
-from confab.reasoner.symbols import FALSE, Problem, Span, State, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, Span, State, Symbol
 
 if TYPE_CHECKING:
     from confab.planner.acting.episode import Episode

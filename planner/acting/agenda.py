@@ -6,7 +6,8 @@ from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from confab.planner.plan import Reason, Step, renumbered
-from confab.reasoner.symbols import Problem, State, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import State, Symbol
 
 
 @dataclass

@@ -16,6 +16,7 @@ from confab.planner.validation import followed
 from confab.reasoner.aggregates.totals import following
 from confab.reasoner.amounts import DECIMAL
 from confab.reasoner.possible import PLACE
+from confab.reasoner.problem import Problem
 from confab.reasoner.refutations import Refutation, with_refuted
 from confab.reasoner.symbols import (
     FALSE,
@@ -26,7 +27,6 @@ from confab.reasoner.symbols import (
     EqualityCondition,
     Fact,
     Parameter,
-    Problem,
     SituationType,
     State,
     Symbol,

@@ -12,7 +12,8 @@ from confab.planner.timed.activities import in_sequence
 from confab.planner.timed.call import Timed, in_time
 from confab.planner.timed.dispatch import Dispatch
 from confab.planner.timed.plan import TimedPlan
-from confab.reasoner.symbols import Problem, Symbol, Times
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Symbol, Times
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,9 @@ from confab.planner.plan import Plan, Reason, Step
 from confab.reasoner.amounts import meets
 from confab.reasoner.derivation import deciding
 from confab.reasoner.names import brief, known_as
+from confab.reasoner.problem import Problem
 from confab.reasoner.refutations import Refutation
-from confab.reasoner.symbols import FALSE, Fact, Problem, State, Symbol
+from confab.reasoner.symbols import FALSE, Fact, State, Symbol
 
 
 class InterventionKind(Enum):

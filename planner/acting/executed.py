@@ -13,7 +13,8 @@ from confab.planner.acting.episode import Episode, InterventionKind, situation
 from confab.planner.acting.symbolic_world import met, with_individual
 from confab.planner.plan import Plan, Step
 from confab.planner.validation import carried_out, followed, open_goals
-from confab.reasoner.symbols import FALSE, Problem, State
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, State
 
 
 def as_planned(problem: Problem, episode: Episode) -> Iterator[tuple[Problem, Plan]]:

@@ -48,8 +48,9 @@ from confab.planner.timed.activities import InapplicableError, StepSimulation
 from confab.planner.validation import followed, open_goals
 from confab.reasoner.derivation import said_by
 from confab.reasoner.limits import LimitError, check, current
+from confab.reasoner.problem import Problem
 from confab.reasoner.refutations import Refutation
-from confab.reasoner.symbols import FALSE, Fact, Problem, State, Symbol, Times
+from confab.reasoner.symbols import FALSE, Fact, State, Symbol, Times
 
 
 def act(

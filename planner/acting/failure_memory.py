@@ -16,8 +16,9 @@ from typing import TypeAlias
 
 from confab.planner.acting.episode import Episode
 from confab.planner.plan import Limits, Plan, Planner, Status, Step
+from confab.reasoner.problem import Problem
 from confab.reasoner.refutations import Refutation
-from confab.reasoner.symbols import Fact, Problem, RelationCondition
+from confab.reasoner.symbols import Fact, RelationCondition
 
 Static: TypeAlias = "tuple[str, tuple[str, ...]]"
 """A static fact: relation and individuals."""

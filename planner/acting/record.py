@@ -17,8 +17,9 @@ from confab.planner.acting.episode import (
     changes,
 )
 from confab.planner.plan import Plan, Reason, Step
+from confab.reasoner.problem import Problem
 from confab.reasoner.refutations import Refutation
-from confab.reasoner.symbols import Problem, State
+from confab.reasoner.symbols import State
 
 
 @dataclass

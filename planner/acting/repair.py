@@ -29,7 +29,8 @@ from confab.planner.transitions import Cell, arguments_of, key_of
 from confab.planner.validation import validate
 from confab.reasoner.amounts import meets
 from confab.reasoner.limits import LimitError, check, within
-from confab.reasoner.symbols import FALSE, Problem, State, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, State, Symbol
 from confab.reasoner.timing import may_overlap_by_need
 
 CLOSE = 1.1

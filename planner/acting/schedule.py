@@ -15,7 +15,8 @@ import networkx
 
 from confab.planner.plan import Step
 from confab.planner.validation import followed
-from confab.reasoner.symbols import Problem, State, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import State, Symbol
 
 PartialOrder: TypeAlias = "networkx.DiGraph[int]"
 Compatible = Callable[[Step, Step], bool]

@@ -18,8 +18,10 @@ from confab.planner.timed.activities import InapplicableError, StepSimulation
 from confab.planner.timed.pieces import SECOND
 from confab.planner.validation import successor
 from confab.reasoner.aggregates.totals import following
+from confab.reasoner.effects import spread_to
 from confab.reasoner.possible import PLACE, refuse_impossible
-from confab.reasoner.symbols import Problem, State, Symbol, spread_to
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import State, Symbol
 
 if TYPE_CHECKING:
     from confab.planner.timed.dispatch import Dispatch

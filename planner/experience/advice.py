@@ -27,7 +27,7 @@ from confab.planner.hierarchical.methods import Roles
 from confab.planner.plan import Limits, Outcome, paused_collection
 from confab.reasoner.amounts import meets
 from confab.reasoner.memory.experience import ITSELF, Experience, LearnedOrder, LearnedRule, Method, Tallies, Tally
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 
 
 @dataclass

@@ -22,7 +22,8 @@ from confab.planner.hierarchical.operators import Program
 from confab.planner.transitions import Cell, Table
 from confab.reasoner.language import walk
 from confab.reasoner.memory.experience import ITSELF, Experience, LearnedRule, Method, RoleFact, Tally
-from confab.reasoner.symbols import FALSE, ClassCondition, Problem, Witness
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, ClassCondition, Witness
 
 DECAY = 0.9
 """Factor by which a preference decays with each later episode."""

@@ -36,7 +36,8 @@ from confab.reasoner.memory.experience import (
     RoleFact,
     Tally,
 )
-from confab.reasoner.symbols import Problem, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Symbol
 
 SINGLE, OTHERS = 6, 2
 """Maximum number of goals that are taught separately, and maximum number of additional orders of all goals."""

@@ -13,9 +13,10 @@ from typing import TypeAlias
 
 from confab.planner.generated import identifier, tuple_written, written
 from confab.planner.transitions import PythonWriter, Table
-from confab.reasoner.language import is_variable, mentions, walk
+from confab.reasoner.language import is_variable, mentions, substituted, walk
 from confab.reasoner.memory.experience import LearnedRule
-from confab.reasoner.symbols import Comparison, Condition, Problem, RelationCondition, ValueCondition, substituted
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Comparison, Condition, RelationCondition, ValueCondition
 
 Find: TypeAlias = "Callable[..., Iterator[tuple[tuple[str, ...], tuple[int, ...]]]]"
 """Function that yields the instances of a rule, each as the individuals in the roles and the positions of unmet conditions.

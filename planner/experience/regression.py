@@ -22,9 +22,10 @@ from confab.planner.hierarchical.operators import named
 from confab.planner.validation import BehaviorReader, LoggedState
 from confab.reasoner.amounts import Amount, inside, meets, towards
 from confab.reasoner.derivation import strata
-from confab.reasoner.language import terms, walk
+from confab.reasoner.language import substituted, terms, walk
 from confab.reasoner.limits import check
 from confab.reasoner.memory.experience import Ground, LearnedOrder, LearnedRule, LearningError
+from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -34,11 +35,9 @@ from confab.reasoner.symbols import (
     Condition,
     EqualityCondition,
     Fact,
-    Problem,
     RelationCondition,
     ValueCondition,
     Witness,
-    substituted,
 )
 
 WRITABLE = ValueCondition, RelationCondition, ClassCondition, EqualityCondition, Witness, AnyOf

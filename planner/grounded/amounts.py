@@ -32,7 +32,8 @@ from confab.reasoner.amounts import (
     situations_in,
     written,
 )
-from confab.reasoner.symbols import Fact, Problem, State, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Fact, State, Symbol
 
 Exact: TypeAlias = "int | Fraction"
 AmountVector: TypeAlias = "tuple[Exact, ...]"

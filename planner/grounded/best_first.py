@@ -29,7 +29,8 @@ from confab.planner.grounded.shortest import least
 from confab.planner.grounded.task import Task
 from confab.planner.plan import OUT_OF_MEMORY, Counts, Limits, Outcome, Plan, Reason, Status, UngroundableError
 from confab.reasoner.limits import OutOfTimeError
-from confab.reasoner.symbols import Problem, State
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import State
 
 BASE_WORK, STEP_WORK, STEPS_COUNTED, SEARCH_SHARE = 200_000, 1_000, 400, 50
 """Constants that determine the maximum work of shortening a plan; the unit is one examined operator.

@@ -18,7 +18,8 @@ from confab.planner.grounded.joins import JoinTable
 from confab.planner.grounded.schemas import plain_variables
 from confab.planner.plan import UngroundableError
 from confab.reasoner.amounts import Amount, bounds
-from confab.reasoner.language import mentions
+from confab.reasoner.language import mentions, substituted
+from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -27,13 +28,11 @@ from confab.reasoner.symbols import (
     Comparison,
     Condition,
     EqualityCondition,
-    Problem,
     RelationCondition,
     SituationType,
     Symbol,
     ValueCondition,
     Witness,
-    substituted,
 )
 
 CONDITIONS_PER_ROW = 20

@@ -33,7 +33,8 @@ from confab.planner.grounded.task import BitChange, Task, grouped
 from confab.planner.plan import Reason
 from confab.reasoner.amounts import written
 from confab.reasoner.language import mentions
-from confab.reasoner.symbols import Fact, Problem, State
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Fact, State
 
 MOST_ROWS = 20_000_000
 """Maximum number of rows of one join (about 1 GB)."""

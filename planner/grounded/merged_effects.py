@@ -7,7 +7,8 @@ from dataclasses import replace
 from itertools import groupby
 
 from confab.reasoner.language import is_variable
-from confab.reasoner.symbols import Parameter, Problem, RelationCondition, SituationType, ValueCondition, ValueEffect
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Parameter, RelationCondition, SituationType, ValueCondition, ValueEffect
 
 
 def merged(problem: Problem, level: int) -> Problem:

@@ -20,6 +20,7 @@ from confab.planner.grounded.schemas import Schema, TablePattern, rules_apart, s
 from confab.planner.grounded.separation import in_parts
 from confab.reasoner.language import mentions
 from confab.reasoner.limits import OutOfTimeError, check
+from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -28,7 +29,6 @@ from confab.reasoner.symbols import (
     Comparison,
     Condition,
     EqualityCondition,
-    Problem,
     RelationCondition,
     SituationType,
     State,

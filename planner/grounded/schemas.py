@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 from itertools import count
 
 from confab.reasoner.amounts import put_in, situations_in, terms_of
-from confab.reasoner.language import DomainError, is_variable, mentions, terms, walk
+from confab.reasoner.effects import allowed
+from confab.reasoner.language import DomainError, is_variable, mentions, substituted, terms, walk
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -30,8 +31,6 @@ from confab.reasoner.symbols import (
     ValueCondition,
     ValueEffect,
     Witness,
-    allowed,
-    substituted,
 )
 
 

@@ -27,7 +27,8 @@ from confab.planner.grounded.derived import Derived
 from confab.planner.grounded.joins import Ints
 from confab.planner.grounded.successors import tree
 from confab.planner.plan import Step
-from confab.reasoner.symbols import FALSE, Fact, Problem, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, Fact, Symbol
 
 BitChange = tuple[int, int, int]
 """Three masks: a condition, the bits to clear, and the bits to set afterwards.

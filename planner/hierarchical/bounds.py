@@ -29,7 +29,7 @@ from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, Ungrounda
 from confab.planner.plan_costs import cost_of
 from confab.planner.validation import validate
 from confab.reasoner.limits import LimitError, OutOfTimeError
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 
 WORK = 1_000_000
 """Maximum number of operators that are examined to shorten the best plan on the lowest level."""

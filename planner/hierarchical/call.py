@@ -18,7 +18,8 @@ from confab.planner.plan import Outcome, Plan, Reason, Status, Step
 from confab.planner.transitions import Cell, Table, arguments_of, key_of
 from confab.reasoner.amounts import meets
 from confab.reasoner.memory.experience import Method
-from confab.reasoner.symbols import FALSE, Fact, Problem, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, Fact, Symbol
 
 
 @dataclass

@@ -15,19 +15,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from confab.reasoner.language import mentions
+from confab.reasoner.language import mentions, substituted
+from confab.reasoner.problem import Domain, Problem
 from confab.reasoner.symbols import (
     AnyOf,
     Behavior,
     ClassCondition,
     Condition,
-    Domain,
     EqualityCondition,
-    Problem,
     ValueCondition,
     ValueEffect,
     Witness,
-    substituted,
 )
 
 

@@ -24,7 +24,9 @@ from confab.planner.generated import GeneratorFunction, identifier, tuple_writte
 from confab.planner.hierarchical.symmetry import SymmetryClasses, representatives
 from confab.planner.transitions import Forward, Key, PythonWriter, Table, in_binding_order
 from confab.reasoner.amounts import Amount, inside, terms_of
+from confab.reasoner.effects import allowed
 from confab.reasoner.language import measures, mentions, terms, walk
+from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     AmountEffect,
     AnyOf,
@@ -33,13 +35,11 @@ from confab.reasoner.symbols import (
     Comparison,
     Condition,
     EqualityCondition,
-    Problem,
     RelationCondition,
     SituationType,
     ValueCondition,
     ValueEffect,
     Witness,
-    allowed,
 )
 
 Arguments: TypeAlias = "tuple[str, ...]"

@@ -38,7 +38,7 @@ from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, Unsolvabl
 from confab.planner.plan_costs import cost_of
 from confab.planner.validation import validate
 from confab.reasoner.limits import LimitError, current, within
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 
 __all__ = ["DEFAULT_WORK", "Call", "Compiled", "compiled", "plan"]
 

@@ -25,7 +25,8 @@ from confab.planner.hierarchical.workspace import Ground
 from confab.planner.plan import Plan, Step, renumbered
 from confab.planner.transitions import Cell, arguments_of
 from confab.reasoner.limits import LimitError
-from confab.reasoner.symbols import FALSE, Behavior, Problem, ValueEffect
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, Behavior, ValueEffect
 
 StepRange: TypeAlias = "tuple[int, int]"
 """The steps between two positions; position n is the position after n steps."""

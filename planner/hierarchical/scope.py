@@ -27,16 +27,8 @@ from confab.planner.transitions import Cell, arguments_of, key_of
 from confab.reasoner.amounts import meets
 from confab.reasoner.language import walk
 from confab.reasoner.limits import OutOfTimeError
-from confab.reasoner.symbols import (
-    FALSE,
-    Parameter,
-    Problem,
-    RelationCondition,
-    State,
-    Symbol,
-    ValueCondition,
-    Witness,
-)
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, Parameter, RelationCondition, State, Symbol, ValueCondition, Witness
 
 if TYPE_CHECKING:
     from confab.planner.grounded.task import Task

@@ -13,7 +13,8 @@ from confab.planner.plan import Limits, Reason
 from confab.planner.transitions import Cell, arguments_of
 from confab.reasoner.amounts import Quantity, meets, possible_bounds
 from confab.reasoner.limits import LimitError
-from confab.reasoner.symbols import Domain, Fact, Symbol
+from confab.reasoner.problem import Domain
+from confab.reasoner.symbols import Fact, Symbol
 
 QUESTIONS, LOOKED, AMOUNTS = 160, 100_000, 3
 """Maximum number of examined values, maximum number of examined achievers, and maximum number of reported amounts."""

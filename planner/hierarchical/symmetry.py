@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain
 
 from confab.planner.transitions import Key
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 
 ENDS = 8
 """Number of individuals at each end of a large class; only the states of these individuals are examined."""

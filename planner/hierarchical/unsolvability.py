@@ -20,7 +20,8 @@ from confab.planner.hierarchical.scope import BITS, LEAST
 from confab.planner.hierarchical.search_budget import WIDER
 from confab.planner.plan import OUT_OF_MEMORY, Plan, Reason, Status, UngroundableError, UnsolvableError
 from confab.reasoner.limits import within
-from confab.reasoner.symbols import Fact, Problem, State
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Fact, State
 
 if TYPE_CHECKING:
     from confab.planner.grounded.best_first import Search

@@ -20,7 +20,7 @@ from confab.planner.levels import levels_left
 from confab.planner.plan import Plan, UngroundableError
 from confab.planner.plan_costs import compared
 from confab.planner.validation import validate
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 
 if TYPE_CHECKING:
     from confab.planner.grounded.task import Task

@@ -12,7 +12,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from confab.reasoner.memory.links import Conclusion, Links
-from confab.reasoner.symbols import Problem, State, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import State, Symbol
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,8 @@ from confab.planner.paper.transitions import Applied, Model, Values, ground
 from confab.planner.plan import Counts, Limits, Outcome, Plan, Reason, Status, Step, UnsolvableError, renumbered
 from confab.reasoner.limits import OutOfTimeError
 from confab.reasoner.memory.links import Links
-from confab.reasoner.symbols import Fact, GroundBehavior, Problem
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Fact, GroundBehavior
 
 SETTLED, UNSETTLED = "settled", "unsettled"
 """Marks of a symbol that isn't at rest in the beginning (`Target`).

@@ -13,7 +13,8 @@ from confab.planner.plan import Plan, Step
 from confab.reasoner.limits import check
 from confab.reasoner.memory.experience import LearningError
 from confab.reasoner.memory.links import Conclusion, Links
-from confab.reasoner.symbols import GroundBehavior, Problem, State
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import GroundBehavior, State
 
 
 def learn(problem: Problem, plan: Plan, links: Links) -> Links:

@@ -10,7 +10,8 @@ from confab.planner.derived_facts import CompiledRules
 from confab.planner.transitions import Forward, PythonWriter, Table, key_of
 from confab.reasoner.amounts import Number
 from confab.reasoner.limits import check_listed, checked
-from confab.reasoner.symbols import FALSE, GroundBehavior, Problem, State, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, GroundBehavior, State, Symbol
 
 Values = tuple[str, ...]
 

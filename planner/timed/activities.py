@@ -18,7 +18,8 @@ from confab.planner.timed.pieces import Pieces, actors_of, default_actors, durat
 from confab.planner.timed.pools import AmountUse, counts_of
 from confab.planner.validation import BehaviorReader, Cell, LoggedState
 from confab.reasoner.limits import check
-from confab.reasoner.symbols import Behavior, Problem, State, Symbol, Times
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Behavior, State, Symbol, Times
 from confab.reasoner.timing import judged_by_events
 
 ReadAccess: TypeAlias = "tuple[str, object]"

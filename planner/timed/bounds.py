@@ -21,7 +21,8 @@ from confab.planner.timed.pieces import actors_of, default_actors, duration_of, 
 from confab.planner.validation import LoggedState
 from confab.reasoner.amounts import situations_in
 from confab.reasoner.limits import OutOfTimeError, checked, current
-from confab.reasoner.symbols import Parameter, Problem, Span
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Parameter, Span
 from confab.reasoner.timing import timing_of
 
 MOST_ROWS = 50_000

@@ -31,7 +31,8 @@ from confab.planner.timed.validation import validate_timed
 from confab.planner.validation import validate
 from confab.reasoner.derivation import said_by
 from confab.reasoner.limits import LimitError, check, overtime, within
-from confab.reasoner.symbols import Problem, Times
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Times
 from confab.reasoner.timing import judged_by_events
 
 KEPT = 0.25

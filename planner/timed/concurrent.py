@@ -35,6 +35,7 @@ from confab.planner.timed.plan import TimedOutcome
 from confab.planner.validation import Cell, LoggedState
 from confab.reasoner.language import walk
 from confab.reasoner.limits import OutOfTimeError, check, checked
+from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -42,7 +43,6 @@ from confab.reasoner.symbols import (
     Behavior,
     Effect,
     Fact,
-    Problem,
     SituationType,
     Span,
     ValueCondition,

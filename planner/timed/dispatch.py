@@ -35,7 +35,8 @@ from confab.planner.timed.schedules import (
     turn_edges,
 )
 from confab.planner.timed.validation import validate_timed
-from confab.reasoner.symbols import Problem, Symbol, Times
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Symbol, Times
 
 UNIT = Fraction(1, 1000)
 """The unit of observed times, in seconds; observed times are rounded up."""

@@ -19,15 +19,8 @@ from confab.planner.timed.schedules import ActorChoices
 from confab.planner.validation import BehaviorReader, LoggedState
 from confab.reasoner.amounts import situations_in
 from confab.reasoner.limits import check
-from confab.reasoner.symbols import (
-    ClassCondition,
-    Comparison,
-    Condition,
-    EqualityCondition,
-    Problem,
-    RelationCondition,
-    Times,
-)
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import ClassCondition, Comparison, Condition, EqualityCondition, RelationCondition, Times
 
 
 def choices_of(problem: Problem, plan: Plan, order: Order, network: Network) -> ActorChoices:

@@ -9,7 +9,8 @@ from fractions import Fraction
 
 from confab.planner.timed.pieces import actors_of, default_actors, pieces_of
 from confab.reasoner.memory.experience import MeasuredDuration, Statistics
-from confab.reasoner.symbols import PrimitiveStep, Problem, Times
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import PrimitiveStep, Times
 
 PARTS = 1000
 """Number of parts of a second to which a mean is rounded."""

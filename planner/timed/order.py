@@ -27,7 +27,8 @@ from confab.planner.validation import Cell
 from confab.reasoner.amounts import meets
 from confab.reasoner.derivation import deciding
 from confab.reasoner.limits import check
-from confab.reasoner.symbols import Problem, Symbol, Times, ValueCondition
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Symbol, Times, ValueCondition
 
 BEGIN, END = 0, 1
 Edge = tuple[int, int, int, int]

@@ -18,13 +18,13 @@ from fractions import Fraction
 from confab.planner.checked_amounts import worth
 from confab.planner.checked_conditions import Arguments, ConditionReader
 from confab.planner.validation import BehaviorReader, LoggedState
+from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     AmountEffect,
     Behavior,
     Condition,
     Effect,
     Parameter,
-    Problem,
     Span,
     Times,
     Timing,

@@ -37,7 +37,8 @@ from confab.planner.timed.pieces import default_actors
 from confab.planner.timed.schedules import turn_edges
 from confab.planner.validation import BehaviorReader, LoggedState, validate
 from confab.reasoner.limits import LimitError, check
-from confab.reasoner.symbols import AnyOf, Behavior, Condition, EqualityCondition, Problem, Symbol, ValueCondition
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import AnyOf, Behavior, Condition, EqualityCondition, Symbol, ValueCondition
 from confab.reasoner.timing import timing_of
 
 MOST_CREWS = 64

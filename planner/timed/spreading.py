@@ -17,7 +17,7 @@ from confab.planner.timed.exchange import exchanged, possible
 from confab.planner.timed.order import Order, order_in_sequence
 from confab.planner.validation import BehaviorReader, LoggedState, validate
 from confab.reasoner.limits import check
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,8 @@ from confab.planner.validation import (
 )
 from confab.reasoner.amounts import meets
 from confab.reasoner.limits import check
-from confab.reasoner.symbols import FALSE, Behavior, Problem, Symbol, Times
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, Behavior, Symbol, Times
 from confab.reasoner.timing import judged_by_events
 
 

@@ -9,10 +9,12 @@ from itertools import chain, islice
 from confab.reasoner.aggregates import keeping
 from confab.reasoner.aggregates.keeping import MOST_CONDITIONS
 from confab.reasoner.aggregates.remembering import in_order_of_update, remembering
+from confab.reasoner.effects import spread
 from confab.reasoner.folding import Folding
 from confab.reasoner.language import DomainError, mentions, walk
 from confab.reasoner.limits import check
-from confab.reasoner.symbols import AnyOf, Behavior, Condition, Domain, Effect, Witness, spread
+from confab.reasoner.problem import Domain
+from confab.reasoner.symbols import AnyOf, Behavior, Condition, Effect, Witness
 
 
 def compiled(domain: Domain, classes: Mapping[str, Sequence[str]]) -> Domain:

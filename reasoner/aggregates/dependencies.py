@@ -9,7 +9,7 @@ from itertools import count
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, inside, situations_in
 from confab.reasoner.closure import closure
 from confab.reasoner.derivation import circular
-from confab.reasoner.language import DomainError, situations_of, walk
+from confab.reasoner.language import DomainError, situations_of, substituted, walk
 from confab.reasoner.symbols import (
     FALSE,
     Aggregate,
@@ -20,7 +20,6 @@ from confab.reasoner.symbols import (
     Rule,
     ValueCondition,
     Witness,
-    substituted,
 )
 
 

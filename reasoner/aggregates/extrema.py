@@ -7,7 +7,8 @@ from dataclasses import replace
 
 from confab.reasoner.aggregates.dependencies import existing
 from confab.reasoner.amounts import Amount, Calculation, Expression, inside, put_in
-from confab.reasoner.language import DomainError, mentions
+from confab.reasoner.language import DomainError, mentions, substituted
+from confab.reasoner.problem import Domain
 from confab.reasoner.symbols import (
     Aggregate,
     AmountEffect,
@@ -16,13 +17,11 @@ from confab.reasoner.symbols import (
     ClassCondition,
     Comparison,
     Condition,
-    Domain,
     Effect,
     Parameter,
     Timing,
     ValueEffect,
     Witness,
-    substituted,
 )
 
 

@@ -36,7 +36,8 @@ from confab.reasoner.afterwards import (
 )
 from confab.reasoner.aggregates.dependencies import divides, existing, read_by
 from confab.reasoner.amounts import Amount, Calculation, Expression, inside, put_in, terms_of
-from confab.reasoner.language import DomainError, groups, is_variable, mentions, walk
+from confab.reasoner.effects import made_of
+from confab.reasoner.language import DomainError, groups, is_variable, mentions, substituted, walk
 from confab.reasoner.limits import check
 from confab.reasoner.symbols import (
     Aggregate,
@@ -50,8 +51,6 @@ from confab.reasoner.symbols import (
     Span,
     ValueCondition,
     ValueEffect,
-    made_of,
-    substituted,
 )
 
 MOST_CONDITIONS = 5_000

@@ -15,19 +15,19 @@ from fractions import Fraction
 from confab.reasoner.aggregates.dependencies import in_order, read_by, unfolded
 from confab.reasoner.aggregates.keeping import kept
 from confab.reasoner.amounts import Quantity
+from confab.reasoner.effects import made_of
 from confab.reasoner.folding import Folding
 from confab.reasoner.language import DomainError, mentions
+from confab.reasoner.problem import Domain
 from confab.reasoner.symbols import (
     TRUE,
     Aggregate,
     AmountEffect,
     Behavior,
-    Domain,
     Parameter,
     SituationType,
     ValueCondition,
     ValueEffect,
-    made_of,
 )
 
 NONE_ALLOWED = Quantity(whole=True, most=Fraction(0))

@@ -20,6 +20,7 @@ from confab.reasoner.amounts import (
     written,
 )
 from confab.reasoner.language import mentions
+from confab.reasoner.problem import Domain, Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -28,9 +29,7 @@ from confab.reasoner.symbols import (
     ClassCondition,
     Comparison,
     Condition,
-    Domain,
     EqualityCondition,
-    Problem,
     RelationCondition,
     SituationType,
     Symbol,

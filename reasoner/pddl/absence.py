@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 
 from confab.reasoner.pddl.formulas import Atom, PddlTerm
 from confab.reasoner.pddl.vocabulary import PddlNames
-from confab.reasoner.symbols import Behavior, Condition, Problem, ValueCondition, Witness
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Behavior, Condition, ValueCondition, Witness
 
 
 class NegationPredicates:

@@ -38,7 +38,7 @@ from confab.reasoner.pddl.formulas import (
 )
 from confab.reasoner.pddl.lowering import ActionScope, LoweredAction, Lowering
 from confab.reasoner.pddl.vocabulary import PddlNames
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 from confab.reasoner.timing import only_during
 
 LINE = "\n    "

@@ -52,6 +52,7 @@ from confab.reasoner.pddl.forms import (
 from confab.reasoner.pddl.invariants import InvariantPart, Invariants
 from confab.reasoner.pddl.timing import QuantifiedVariables, happenings, snapped, timing
 from confab.reasoner.pddl.words import Form, PddlError, PddlWord, is_number
+from confab.reasoner.problem import Domain, Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -62,10 +63,8 @@ from confab.reasoner.symbols import (
     Comparison,
     Condition,
     Constraint,
-    Domain,
     EqualityCondition,
     Parameter,
-    Problem,
     RelationCondition,
     Rule,
     SituationType,

@@ -49,6 +49,7 @@ from confab.reasoner.pddl.formulas import (
     some,
 )
 from confab.reasoner.pddl.vocabulary import PddlNames
+from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     FALSE,
     AmountEffect,
@@ -58,7 +59,6 @@ from confab.reasoner.symbols import (
     Comparison,
     Condition,
     EqualityCondition,
-    Problem,
     RelationCondition,
     Symbol,
     ValueCondition,

@@ -17,6 +17,7 @@ import pyoxigraph as ox
 from confab.reasoner.amounts import Measure, bounds, written
 from confab.reasoner.condition_nodes import NodeWriter, Properties, decimal_text, finite, relation_properties
 from confab.reasoner.language import measures
+from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -24,7 +25,6 @@ from confab.reasoner.symbols import (
     Behavior,
     Fact,
     Parameter,
-    Problem,
     Rule,
     SituationType,
     Span,

@@ -12,7 +12,8 @@ from confab.reasoner.language import walk
 from confab.reasoner.pddl.formulas import FALSE as NEVER
 from confab.reasoner.pddl.formulas import TRUE as ALWAYS
 from confab.reasoner.pddl.formulas import Arithmetic, Atom, Formula, FunctionTerm, NumericTerm, PddlTerm, both
-from confab.reasoner.symbols import TRUE, Problem, Witness
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import TRUE, Witness
 
 WORLD = "World"
 """Class whose only individual is the argument of each symbol that has no argument in PDDL."""

@@ -25,6 +25,7 @@ import pyoxigraph as ox
 
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, after_effect
 from confab.reasoner.derivation import circular, strata
+from confab.reasoner.effects import allowed
 from confab.reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph, text
 from confab.reasoner.limits import checked
 from confab.reasoner.reading.problem import Reading
@@ -46,7 +47,6 @@ from confab.reasoner.symbols import (
     Symbol,
     ValueCondition,
     Witness,
-    allowed,
 )
 from confab.reasoner.vocabulary import ARGUMENTS
 

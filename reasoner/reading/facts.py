@@ -13,10 +13,11 @@ from confab.reasoner.language import measured, walk
 from confab.reasoner.limits import checked
 from confab.reasoner.names import Names
 from confab.reasoner.possible import earlier_states, values_at_fault
+from confab.reasoner.problem import Domain
 from confab.reasoner.reading.definitions import Definitions
 from confab.reasoner.reading.goals import check_arguments
 from confab.reasoner.reading.parts import Parts
-from confab.reasoner.symbols import TRUE, Domain, RelationCondition, SituationType, State, Symbol
+from confab.reasoner.symbols import TRUE, RelationCondition, SituationType, State, Symbol
 from confab.reasoner.vocabulary import CORE
 
 READING = "reading the scene"

@@ -17,6 +17,7 @@ from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.language import DomainError, walk
 from confab.reasoner.limits import checked
 from confab.reasoner.names import Names, local_name
+from confab.reasoner.problem import Domain
 from confab.reasoner.reading import swrl
 from confab.reasoner.reading.definitions import THING, Definitions
 from confab.reasoner.reading.facts import individuals_named
@@ -41,7 +42,6 @@ from confab.reasoner.symbols import (
     Behavior,
     Comparison,
     Constraint,
-    Domain,
     Parameter,
     Perceived,
     Rule,

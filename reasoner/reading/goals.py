@@ -13,8 +13,9 @@ from confab.reasoner.amounts import DECIMAL, Amount, bounds_written, written
 from confab.reasoner.closure import closure
 from confab.reasoner.derivation import TASK, needed
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.language import is_variable, mentions, terms, walk
+from confab.reasoner.language import is_variable, mentions, substituted, terms, walk
 from confab.reasoner.names import nearest
+from confab.reasoner.problem import Domain, Problem
 from confab.reasoner.reading.parts import Parts
 from confab.reasoner.reading.rows import is_a
 from confab.reasoner.symbols import (
@@ -22,17 +23,14 @@ from confab.reasoner.symbols import (
     TRUE,
     Comparison,
     Condition,
-    Domain,
     Fact,
     Parameter,
-    Problem,
     Rule,
     SituationType,
     Symbol,
     Times,
     ValueCondition,
     Witness,
-    substituted,
 )
 
 BOUNDS = re.compile(rf"((<=?|>=?|=)?{DECIMAL.pattern})(,(<=?|>=?|=)?{DECIMAL.pattern})*")

@@ -21,8 +21,9 @@ from confab.reasoner.files import write_whole
 from confab.reasoner.graph.knowledge import BASE, KnowledgeError, KnowledgeGraph, read_into, text
 from confab.reasoner.names import Names
 from confab.reasoner.possible import ImpossibleStateError, refuse_impossible
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.problem import Reading
-from confab.reasoner.symbols import Problem, State, Symbol
+from confab.reasoner.symbols import State, Symbol
 from confab.reasoner.vocabulary import ARGUMENTS, CORE, INDIVIDUAL, OWL, TYPE
 
 FACTS = """

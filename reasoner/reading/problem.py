@@ -26,6 +26,7 @@ from confab.reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGrap
 from confab.reasoner.language import DomainError
 from confab.reasoner.limits import check, checked
 from confab.reasoner.names import Names, brief
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.facts import check_values, facts_of, initial_state
 from confab.reasoner.reading.frame import Frame, frame, names_of
 from confab.reasoner.reading.goals import with_task
@@ -41,7 +42,6 @@ from confab.reasoner.reading.rows import (
 )
 from confab.reasoner.reading.schema import read_schema
 from confab.reasoner.reading.times import with_times
-from confab.reasoner.symbols import Problem
 
 MEMBERS = """
 SELECT DISTINCT ?individual ?class ?index WHERE {

@@ -26,7 +26,7 @@ import pyoxigraph as ox
 from confab.reasoner.aggregates.dependencies import read_by
 from confab.reasoner.amounts import situations_in, terms_of
 from confab.reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, text
-from confab.reasoner.language import situations_of, terms
+from confab.reasoner.language import situations_of, substituted, terms
 from confab.reasoner.limits import check, checked
 from confab.reasoner.names import local_name
 from confab.reasoner.reading.frame import Frame, frame, names_of
@@ -57,7 +57,6 @@ from confab.reasoner.symbols import (
     ValueCondition,
     ValueEffect,
     Witness,
-    substituted,
 )
 from confab.reasoner.vocabulary import CORE, PREFIXES, TYPE
 

@@ -23,9 +23,10 @@ from confab.reasoner.closure import closure
 from confab.reasoner.derivation import circular, needed
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.names import Names, local_name
+from confab.reasoner.problem import Domain
 from confab.reasoner.reading.parts import Parts
 from confab.reasoner.reading.rows import OntologySchema
-from confab.reasoner.symbols import FALSE, TRUE, Constraint, Domain, Parameter, Rule, SituationType, ValueCondition
+from confab.reasoner.symbols import FALSE, TRUE, Constraint, Parameter, Rule, SituationType, ValueCondition
 from confab.reasoner.vocabulary import CORE
 
 

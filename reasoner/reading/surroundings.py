@@ -11,20 +11,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import TypeAlias
 
 from confab.reasoner.graph.knowledge import SCENE, KnowledgeGraph, text
+from confab.reasoner.language import substituted
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.frame import Frame, frame
 from confab.reasoner.reading.individuals import FACT, PLACES, Individuals, constants_of, goal_conditions, values_of
 from confab.reasoner.reading.problem import Reading, reading_of
-from confab.reasoner.symbols import (
-    FALSE,
-    TRUE,
-    Behavior,
-    Condition,
-    Problem,
-    RelationCondition,
-    ValueCondition,
-    Witness,
-    substituted,
-)
+from confab.reasoner.symbols import FALSE, TRUE, Behavior, Condition, RelationCondition, ValueCondition, Witness
 from confab.reasoner.vocabulary import CORE, TYPE
 
 LookupForm: TypeAlias = "tuple[tuple[str, tuple[bool, ...]], ...]"

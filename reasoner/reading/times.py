@@ -8,9 +8,10 @@ from fractions import Fraction
 
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.names import local_name
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.parts import Parts
 from confab.reasoner.reading.rows import OntologySchema
-from confab.reasoner.symbols import Problem, Times
+from confab.reasoner.symbols import Times
 
 
 def with_times(problem: Problem, parts: Parts, schema: OntologySchema) -> Problem:

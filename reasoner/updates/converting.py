@@ -18,11 +18,12 @@ import pyoxigraph as ox
 
 from confab.reasoner.closure import closure
 from confab.reasoner.graph.knowledge import SCENE, KnowledgeError, KnowledgeGraph, load, readable, scene_file, text
+from confab.reasoner.language import substituted
 from confab.reasoner.names import local_name
 from confab.reasoner.reading.frame import as_written
 from confab.reasoner.reading.rows import OntologySchema
 from confab.reasoner.reading.schema import read_schema
-from confab.reasoner.symbols import AnyOf, Behavior, Condition, Span, Witness, substituted
+from confab.reasoner.symbols import AnyOf, Behavior, Condition, Span, Witness
 from confab.reasoner.updates.compiling import compiled
 from confab.reasoner.updates.writing import Situations, update
 from confab.reasoner.vocabulary import CORE, INDIVIDUAL, LABEL, SKOS, TYPE, XSD

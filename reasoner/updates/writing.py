@@ -13,7 +13,8 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, written
-from confab.reasoner.language import walk
+from confab.reasoner.effects import made_of
+from confab.reasoner.language import substituted, walk
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -28,8 +29,6 @@ from confab.reasoner.symbols import (
     ValueCondition,
     ValueEffect,
     Witness,
-    made_of,
-    substituted,
 )
 
 CHANGES = {"increase": "+", "decrease": "-", "scale": "*"}

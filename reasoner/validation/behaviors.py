@@ -8,7 +8,8 @@ from collections.abc import Iterator, Mapping, Sequence, Set
 
 from confab.reasoner.amounts import terms_of
 from confab.reasoner.closure import closure
-from confab.reasoner.language import mentions
+from confab.reasoner.language import mentions, substituted
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.goals import some_of
 from confab.reasoner.sentences import plain
 from confab.reasoner.symbols import (
@@ -18,12 +19,10 @@ from confab.reasoner.symbols import (
     AnyOf,
     Behavior,
     Condition,
-    Problem,
     Span,
     ValueCondition,
     ValueEffect,
     Witness,
-    substituted,
 )
 from confab.reasoner.timing import timing_of
 from confab.reasoner.validation.case import Fault, ReadCase

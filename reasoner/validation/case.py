@@ -11,8 +11,9 @@ import pyoxigraph as ox
 
 from confab.reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph
 from confab.reasoner.names import Names
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.problem import Reading
-from confab.reasoner.symbols import Behavior, Problem
+from confab.reasoner.symbols import Behavior
 from confab.reasoner.vocabulary import CORE, RDF
 
 Fault = tuple[str, str, str, str]

@@ -9,6 +9,7 @@ from fractions import Fraction
 from confab.reasoner.amounts import COMPARING, Amount
 from confab.reasoner.language import groups
 from confab.reasoner.possible import against_physics
+from confab.reasoner.problem import Problem
 from confab.reasoner.sentences import plain
 from confab.reasoner.symbols import (
     FALSE,
@@ -20,7 +21,6 @@ from confab.reasoner.symbols import (
     Comparison,
     Condition,
     EqualityCondition,
-    Problem,
     RelationCondition,
     Span,
     ValueCondition,

@@ -11,9 +11,10 @@ from confab.reasoner.closure import closure
 from confab.reasoner.condition_nodes import NodeValues
 from confab.reasoner.derivation import needed
 from confab.reasoner.names import local_name
+from confab.reasoner.problem import Domain
 from confab.reasoner.reading.definitions import Definitions
 from confab.reasoner.reading.rows import OntologySchema
-from confab.reasoner.symbols import ClassCondition, Domain, Parameter, Rule, ValueCondition
+from confab.reasoner.symbols import ClassCondition, Parameter, Rule, ValueCondition
 from confab.reasoner.validation.case import Fault, ReadCase
 from confab.reasoner.vocabulary import CORE, OWL, RDF, RDFS
 

@@ -16,13 +16,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     Behavior,
     Condition,
     EqualityCondition,
-    Problem,
     ValueCondition,
     ValueEffect,
     Witness,

@@ -9,9 +9,10 @@ from math import inf
 
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, exact, inside, situations_in, written
 from confab.reasoner.language import groups, is_variable, walk
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.goals import some_of
 from confab.reasoner.sentences import counted, plain
-from confab.reasoner.symbols import AmountEffect, Behavior, ClassCondition, Comparison, Condition, Problem, Witness
+from confab.reasoner.symbols import AmountEffect, Behavior, ClassCondition, Comparison, Condition, Witness
 from confab.reasoner.validation.case import Fault, ReadCase
 
 

@@ -8,7 +8,8 @@ from collections.abc import Iterator, Mapping
 from fractions import Fraction
 
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure
-from confab.reasoner.symbols import Behavior, Problem, Timing
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Behavior, Timing
 from confab.reasoner.timing import timing_of
 from confab.reasoner.validation.case import Fault, ReadCase
 

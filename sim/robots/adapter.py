@@ -20,7 +20,8 @@ from confab.planner.acting.world import INTERRUPTED, WorldReport
 from confab.planner.plan import Step
 from confab.reasoner.amounts import written
 from confab.reasoner.embodiment.interfaces import Interface, InterfaceCall, ReadField
-from confab.reasoner.symbols import FALSE, TRUE, Fact, Problem, State, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, TRUE, Fact, State, Symbol
 from confab.sim.robots.transport import RobotError, Transport, WorldModel
 
 GRACE = 5.0

@@ -23,7 +23,8 @@ from confab.planner.plan import Step
 from confab.reasoner.embodiment.interfaces import read_interface
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import within
-from confab.reasoner.symbols import Problem, State, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import State, Symbol
 from confab.scene import Scene
 from confab.sim.robots.adapter import InterfaceWorld
 from confab.sim.robots.http_transport import HttpRobot

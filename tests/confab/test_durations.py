@@ -19,7 +19,7 @@ from confab.planner.acting.world import WorldReport
 from confab.planner.plan import Step
 from confab.planning import Result
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 
 SLOWER = {"left_hand": 1.0, "right_hand": 1.5}
 

@@ -10,12 +10,12 @@ from confab.cli import app
 from confab.labels import Labels
 from confab.lifted import Sayings
 from confab.reasoner.memory.experience import LearnedRule
+from confab.reasoner.problem import Domain
 from confab.reasoner.sentences import denied
 from confab.reasoner.symbols import (
     AnyOf,
     Condition,
     Constraint,
-    Domain,
     EqualityCondition,
     Fact,
     RelationCondition,

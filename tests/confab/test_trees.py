@@ -20,6 +20,7 @@ from confab.planner.behavior_tree import Situation
 from confab.planner.plan import Plan, Step
 from confab.planner.validation import open_goals, validate
 from confab.reasoner.amounts import Amount, Quantity
+from confab.reasoner.problem import Domain, Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -27,9 +28,7 @@ from confab.reasoner.symbols import (
     AnyOf,
     Behavior,
     Comparison,
-    Domain,
     Parameter,
-    Problem,
     Rule,
     SituationType,
     Symbol,

@@ -17,11 +17,12 @@ from confab.planner.solve import Mode
 from confab.planner.validation import Fault, carried_out, successor, validate
 from confab.reasoner.graph.knowledge import KnowledgeError, load
 from confab.reasoner.language import DomainError
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading import relevance
 from confab.reasoner.reading.problem import read
 from confab.reasoner.reading.rows import Triple
 from confab.reasoner.reading.surroundings import Surroundings
-from confab.reasoner.symbols import Problem, State
+from confab.reasoner.symbols import State
 from tests.reasoner.test_recognition_of_totals import SUM, yard
 from tests.reasoner.worlds import graph_of, worlds
 

@@ -10,6 +10,7 @@ from itertools import product
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, meets, written
 from confab.reasoner.derivation import strata
 from confab.reasoner.graph.knowledge import load
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.problem import read
 from confab.reasoner.symbols import (
     FALSE,
@@ -20,7 +21,6 @@ from confab.reasoner.symbols import (
     Comparison,
     Condition,
     EqualityCondition,
-    Problem,
     RelationCondition,
     Symbol,
     ValueCondition,

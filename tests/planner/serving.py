@@ -5,8 +5,8 @@ from functools import cache
 from confab.planner.hierarchical.planner import plan
 from confab.planner.plan import Plan
 from confab.reasoner.graph.knowledge import load
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.problem import read
-from confab.reasoner.symbols import Problem
 
 
 @cache

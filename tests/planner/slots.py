@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from confab.planner.acting.schedule import WorkerSlot, partial_order, ready, urgency_of, worker_of, workers_of
 from confab.planner.plan import Step
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 
 
 def schedule(

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AnyOf,
     EqualityCondition,
-    Problem,
     RelationCondition,
     SituationType,
     Symbol,

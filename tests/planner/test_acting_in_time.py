@@ -19,7 +19,8 @@ from confab.planner.timed.validation import validate_timed
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse
 from confab.reasoner.pddl.turtle import turtle
-from confab.reasoner.symbols import Fact, Problem, Symbol, Times
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Fact, Symbol, Times
 from tests.planner.serving import planned, serving
 from tests.planner.test_dispatch import burning, fuse
 from tests.reasoner.test_durative import CELLAR, FUSES, TRUCK, WAY

@@ -15,6 +15,7 @@ from confab.planner.solve import Request, solve
 from confab.reasoner.amounts import Amount, Calculation, Measure, Quantity, bounds_written, meets, written
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse
+from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -24,7 +25,6 @@ from confab.reasoner.symbols import (
     Comparison,
     EqualityCondition,
     Parameter,
-    Problem,
     SituationType,
     Symbol,
     ValueEffect,

@@ -6,14 +6,13 @@ import pytest
 
 from confab.planner.paper.transitions import Model
 from confab.reasoner.language import DomainError
+from confab.reasoner.problem import Domain, Problem
 from confab.reasoner.symbols import (
     AnyOf,
     Behavior,
     Condition,
-    Domain,
     GroundBehavior,
     Parameter,
-    Problem,
     SituationType,
     Symbol,
     ValueCondition,

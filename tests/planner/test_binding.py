@@ -10,7 +10,8 @@ from confab.planner.hierarchical.inherited_preconditions import binding
 from confab.planner.hierarchical.planner import plan
 from confab.planner.plan import Plan
 from confab.planner.validation import successor, validate
-from confab.reasoner.symbols import ClassCondition, Problem, Symbol, ValueCondition
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import ClassCondition, Symbol, ValueCondition
 from worlds.families import family, tabletop
 
 

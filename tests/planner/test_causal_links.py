@@ -14,7 +14,8 @@ from confab.planner.hierarchical.planner import plan as default
 from confab.planner.plan import Limits, Plan, Step
 from confab.planner.plan_costs import cost_of
 from confab.planner.validation import Fault, validate
-from confab.reasoner.symbols import Behavior, Problem, Symbol, ValueEffect
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Behavior, Symbol, ValueEffect
 from tests.planner.small import CASES
 from worlds.families import tabletop
 from worlds.hierarchies import hierarchy

@@ -25,7 +25,9 @@ from confab.planner.preferences import preferred
 from confab.planner.solve import MODES, Mode, Request, solve
 from confab.reasoner.aggregates.compiling import compiled
 from confab.reasoner.amounts import Amount, Calculation, Expression, Quantity
+from confab.reasoner.effects import spread
 from confab.reasoner.generate import write_scene
+from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -36,11 +38,9 @@ from confab.reasoner.symbols import (
     EqualityCondition,
     Fact,
     Parameter,
-    Problem,
     Rule,
     SituationType,
     Symbol,
-    spread,
 )
 from worlds.agreement import solvable
 from worlds.false_certificates import corrupted

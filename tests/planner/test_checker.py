@@ -9,6 +9,7 @@ from confab.planner.grounded.best_first import plan_level
 from confab.planner.plan import Plan, Step
 from confab.planner.validation import BehaviorReader, LoggedState, stretches, successor, validate
 from confab.reasoner.amounts import Amount, Quantity
+from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -17,7 +18,6 @@ from confab.reasoner.symbols import (
     ClassCondition,
     Condition,
     EqualityCondition,
-    Problem,
     RelationCondition,
     SituationType,
     Symbol,

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from confab.planner.paper.cogency import PAPER, PaperConstants, cogencies, ranking
 from confab.planner.paper.learning import reinforce
 from confab.reasoner.memory.links import Links
-from confab.reasoner.symbols import Domain, Problem, SituationType, Symbol
+from confab.reasoner.problem import Domain, Problem
+from confab.reasoner.symbols import SituationType, Symbol
 
 LOCATION = SituationType("LOCATION", ("Cup",), "LOCATION")
 CUP = Symbol("LOCATION", ("cup",))

@@ -17,7 +17,7 @@ from confab.planner.validation import carried_out
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.pddl.syntax import parse
 from confab.reasoner.pddl.words import PddlError
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 from worlds.judging import Judge
 from worlds.mixed import mixed
 

@@ -18,8 +18,9 @@ from confab.reasoner.pddl.exporting import to_pddl
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse
 from confab.reasoner.pddl.turtle import turtle
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.problem import read
-from confab.reasoner.symbols import TRUE, Problem, RelationCondition, SituationType
+from confab.reasoner.symbols import TRUE, RelationCondition, SituationType
 from worlds.numbers import jugs, rounds
 from worlds.writing import becomes, behavior, has, lacks, world
 

@@ -4,7 +4,8 @@ from confab.planner.hierarchical.call import Call, compiled, fresh_call
 from confab.planner.hierarchical.planner import plan
 from confab.planner.plan import Status
 from confab.planner.validation import validate
-from confab.reasoner.symbols import FALSE, TRUE, Problem, SituationType, Witness
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, TRUE, SituationType, Witness
 from worlds.hierarchies import hierarchy
 from worlds.writing import becomes, behavior, has, lacks, world
 

@@ -24,15 +24,14 @@ from confab.reasoner.amounts import Quantity
 from confab.reasoner.graph.knowledge import load
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse
+from confab.reasoner.problem import Domain, Problem
 from confab.reasoner.reading.problem import read
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AmountEffect,
     Behavior,
-    Domain,
     Parameter,
-    Problem,
     Rule,
     SituationType,
     Symbol,

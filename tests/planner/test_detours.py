@@ -8,7 +8,8 @@ from confab.planner.hierarchical.planner import plan
 from confab.planner.hierarchical.shortening import shortened
 from confab.planner.levels import levels_left
 from confab.planner.validation import validate
-from confab.reasoner.symbols import FALSE, TRUE, Problem, SituationType
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, TRUE, SituationType
 from worlds.writing import becomes, behavior, has, lacks, world
 
 

@@ -15,8 +15,9 @@ from confab.planner.timed.dispatch import Dispatch, DispatchRun, simulated
 from confab.planner.timed.plan import TimedPlan
 from confab.planner.timed.validation import validate_timed
 from confab.reasoner.graph.knowledge import load
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.problem import read
-from confab.reasoner.symbols import Problem, Symbol, Times
+from confab.reasoner.symbols import Symbol, Times
 from worlds.timed import Action, TimedWorld, problem_of, timed_world
 
 SPREAD = Fraction(3, 10)

@@ -20,7 +20,8 @@ from confab.planner.hierarchical.planner import compiled, plan
 from confab.planner.paper.transitions import Model, ground
 from confab.planner.plan import Limits, Status
 from confab.planner.validation import validate
-from confab.reasoner.symbols import Problem, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Symbol
 from tests.planner.test_subgoals import museum
 from worlds.families import FAMILIES, family, random_table, table, tabletop
 from worlds.rooms import rooms

@@ -34,7 +34,8 @@ from confab.planner.validation import validate
 from confab.reasoner.limits import OutOfTimeError
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse
-from confab.reasoner.symbols import TRUE, Problem, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import TRUE, Symbol
 from tests.planner.naive import tabletop
 from tests.planner.test_grounding import corridor
 

@@ -18,7 +18,7 @@ from confab.planner.plan import Limits, Plan
 from confab.planner.solve import Request, solve
 from confab.planner.validation import validate
 from confab.reasoner.generate import write_scene
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 from worlds.agreement import cheapest
 from worlds.cups import scene
 from worlds.hierarchies import hierarchy

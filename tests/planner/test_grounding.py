@@ -17,6 +17,7 @@ from confab.planner.grounded.hff import heuristic
 from confab.planner.grounded.task import Task
 from confab.planner.plan import Limits, Reason, Status
 from confab.reasoner.language import DomainError
+from confab.reasoner.problem import Domain, Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -24,10 +25,8 @@ from confab.reasoner.symbols import (
     Behavior,
     ClassCondition,
     Condition,
-    Domain,
     EqualityCondition,
     Parameter,
-    Problem,
     RelationCondition,
     SituationType,
     Symbol,

@@ -24,7 +24,8 @@ from confab.planner.solve import Request, _proof, solve
 from confab.planner.validation import successor, validate
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse
-from confab.reasoner.symbols import FALSE, TRUE, Problem, SituationType, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import FALSE, TRUE, SituationType, Symbol
 from tests.planner import naive
 from tests.planner.small import CASES, Case
 from worlds.agreement import State, complaints, on_top, solvable

@@ -25,9 +25,10 @@ from confab.reasoner import symbols
 from confab.reasoner.amounts import Quantity
 from confab.reasoner.graph.knowledge import SCENE, KnowledgeGraph, text
 from confab.reasoner.language import groups
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.applicable import applicable_query, write_situation
 from confab.reasoner.reading.problem import Reading, read
-from confab.reasoner.symbols import FALSE, Condition, Fact, Problem, Symbol
+from confab.reasoner.symbols import FALSE, Condition, Fact, Symbol
 from tests.planner import naive, small
 from tests.reasoner.worlds import HEAD, graph_of, worlds
 from worlds.language import DEFINED, language

@@ -19,6 +19,7 @@ from confab.reasoner.amounts import Amount, Quantity
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse
 from confab.reasoner.pddl.turtle import turtle
+from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -29,7 +30,6 @@ from confab.reasoner.symbols import (
     Effect,
     Fact,
     Parameter,
-    Problem,
     SituationType,
     Span,
     Symbol,

@@ -10,9 +10,9 @@ from confab.planner.plan import Plan, Status, Step
 from confab.planner.validation import validate
 from confab.reasoner.graph.knowledge import load
 from confab.reasoner.memory.links import Links
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.problem import read
 from confab.reasoner.reading.quantification import quantify
-from confab.reasoner.symbols import Problem
 
 FIGURE_7 = {
     22: {2: [6, 28, 32], 22: [18, 30, 32]},

@@ -24,7 +24,8 @@ from confab.planner.solve import Request, solve
 from confab.planner.validation import unmet_goals, validate
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import OutOfTimeError
-from confab.reasoner.symbols import TRUE, Problem, SituationType, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import TRUE, SituationType, Symbol
 from confab.timing import with_unit_costs
 from worlds.interpreter import Interpreter
 from worlds.mixed import mixed

@@ -25,6 +25,7 @@ from confab.planner.hierarchical.unsolvability import (
 )
 from confab.planner.plan import OUT_OF_MEMORY, Plan, Reason
 from confab.reasoner.amounts import Quantity
+from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -35,7 +36,6 @@ from confab.reasoner.symbols import (
     EqualityCondition,
     Fact,
     Parameter,
-    Problem,
     RelationCondition,
     Rule,
     SituationType,

@@ -23,8 +23,9 @@ from confab.planner.plan import Limits, Outcome, Plan, Status, Step
 from confab.planner.plan_costs import cost_of
 from confab.planner.validation import successor
 from confab.reasoner.graph.knowledge import load
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.problem import read
-from confab.reasoner.symbols import Problem, State, Symbol
+from confab.reasoner.symbols import State, Symbol
 from worlds.families import family, tabletop
 from worlds.trials import Trial, rest_after
 

@@ -32,7 +32,8 @@ from confab.reasoner.language import terms
 from confab.reasoner.memory.experience import ITSELF, Experience, GoalKind, LearnedOrder, Lesson, Method, Tally
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse_files
-from confab.reasoner.symbols import Problem, RelationCondition, SituationType, ValueCondition, Witness
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import RelationCondition, SituationType, ValueCondition, Witness
 from tests.planner.small import van
 from worlds.lessons import backwards, problem, taught
 from worlds.writing import becomes, behavior, has, world

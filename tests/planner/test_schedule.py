@@ -12,7 +12,8 @@ import confab
 from confab.planner.acting.schedule import PartialOrder, partial_order, ready, urgency_of, worker_of
 from confab.planner.plan import Plan, Step
 from confab.planner.validation import validate
-from confab.reasoner.symbols import FALSE, TRUE, Behavior, Domain, Problem, SituationType, Symbol, ValueEffect
+from confab.reasoner.problem import Domain, Problem
+from confab.reasoner.symbols import FALSE, TRUE, Behavior, SituationType, Symbol, ValueEffect
 from tests.planner.serving import planned, serving
 from tests.planner.slots import schedule
 

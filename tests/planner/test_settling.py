@@ -8,7 +8,8 @@ from confab.planner.hierarchical.planner import plan
 from confab.planner.plan import Limits, Status
 from confab.planner.solve import Request, solve
 from confab.planner.validation import successor, validate
-from confab.reasoner.symbols import Problem, State
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import State
 from worlds.families import family
 from worlds.hierarchies import hierarchy
 

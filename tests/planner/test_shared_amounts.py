@@ -14,7 +14,7 @@ from confab.planner.timed.validation import validate_timed
 from confab.reasoner.amounts import Quantity
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 
 
 def jobs(amount: int, *every: tuple[int, int], condition: str = "(>= (free) {0})", takes: str = "decrease") -> Problem:

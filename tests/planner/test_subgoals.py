@@ -16,7 +16,8 @@ from confab.planner.hierarchical.search_budget import WIDER
 from confab.planner.hierarchical.subgoals import Subgoals
 from confab.planner.plan import Limits, Status
 from confab.planner.transitions import Cell
-from confab.reasoner.symbols import Condition, Problem, RelationCondition, SituationType, Witness
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Condition, RelationCondition, SituationType, Witness
 from worlds.families import family, random_table
 from worlds.rooms import rooms
 from worlds.writing import becomes, behavior, has, world

@@ -21,13 +21,12 @@ from confab.reasoner.generate import write_scene
 from confab.reasoner.graph.knowledge import load
 from confab.reasoner.limits import within
 from confab.reasoner.memory.experience import MeasuredDuration
+from confab.reasoner.problem import Domain, Problem
 from confab.reasoner.reading.problem import read
 from confab.reasoner.symbols import (
     TRUE,
     Behavior,
-    Domain,
     Parameter,
-    Problem,
     SituationType,
     Span,
     Symbol,

@@ -25,12 +25,12 @@ from confab.planner.timed.sharing import Crew, crews_of, with_crew
 from confab.planner.timed.validation import validate_timed
 from confab.planner.validation import Fault
 from confab.reasoner.amounts import Amount, Quantity
+from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     TRUE,
     AmountEffect,
     Behavior,
     EqualityCondition,
-    Problem,
     SituationType,
     Span,
     Symbol,

@@ -17,7 +17,7 @@ from confab.planner.validation import validate
 from confab.reasoner.limits import LimitError
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 from confab.scene import load
 from worlds.interpreter import TooManyStatesError
 from worlds.mixed import drawn

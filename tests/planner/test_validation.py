@@ -8,8 +8,9 @@ from confab.planner.paper.hierarchy import plan
 from confab.planner.plan import Plan, Step
 from confab.planner.validation import validate
 from confab.reasoner.graph.knowledge import load
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.problem import read
-from confab.reasoner.symbols import Problem, Symbol
+from confab.reasoner.symbols import Symbol
 from tests.planner.small import Case, fire_door, tool, van
 
 

@@ -20,7 +20,8 @@ from confab.planner.timed.plan import TimedPlan
 from confab.planner.timed.sharing import crews_of
 from confab.planning import Result
 from confab.reasoner.limits import OutOfTimeError
-from confab.reasoner.symbols import Problem, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Symbol
 from confab.timing import Minimise
 from worlds.families import family
 

@@ -8,7 +8,7 @@ import confab
 from confab.planner.plan import Plan, Status
 from confab.planner.solve import Mode
 from confab.planner.validation import successor, validate
-from confab.reasoner.symbols import Problem
+from confab.reasoner.problem import Problem
 
 AT_MOST: Mapping[str, Mapping[int, int]] = {
     # Small scenes: the steps that level 1 needs, and their primitives in the worst order that level 1 allows.

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from confab.reasoner.folding import Folding
+from confab.reasoner.language import substituted
 from confab.reasoner.symbols import (
     AmountEffect,
     AnyOf,
@@ -18,7 +19,6 @@ from confab.reasoner.symbols import (
     EqualityCondition,
     ValueCondition,
     Witness,
-    substituted,
 )
 
 CLASSES = {"Cup": ("a", "b"), "Lid": ("b",), "Ghost": ()}

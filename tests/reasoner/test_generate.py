@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from confab.planner.hierarchical.planner import plan
 from confab.reasoner.generate import FOLDER, PLACEMENTS, families, generate, strips, write_scene
 from confab.reasoner.graph.knowledge import KnowledgeError, load
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.problem import Reading, read
-from confab.reasoner.symbols import Problem, Symbol
+from confab.reasoner.symbols import Symbol
 from confab.reasoner.validation.validate import validate
 
 

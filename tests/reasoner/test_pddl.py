@@ -25,8 +25,8 @@ from confab.reasoner.pddl.importing import Imported, imported
 from confab.reasoner.pddl.syntax import parse, parse_files
 from confab.reasoner.pddl.turtle import turtle
 from confab.reasoner.pddl.words import PddlError
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.problem import read
-from confab.reasoner.symbols import Problem
 from confab.reasoner.validation.validate import validate
 from tests.planner.naive import tabletop
 

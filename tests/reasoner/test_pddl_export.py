@@ -19,16 +19,15 @@ from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.pddl.exporting import to_pddl
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse, parse_files
+from confab.reasoner.problem import Domain, Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     AmountEffect,
     Behavior,
     Comparison,
-    Domain,
     EqualityCondition,
     Parameter,
-    Problem,
     Rule,
     SituationType,
     Symbol,

@@ -18,7 +18,8 @@ from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse
 from confab.reasoner.pddl.turtle import turtle
 from confab.reasoner.pddl.words import PddlError
-from confab.reasoner.symbols import TRUE, Problem, SituationType, Symbol
+from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import TRUE, SituationType, Symbol
 from worlds.writing import becomes, behavior, has, lacks, world
 
 COSTS = "(:functions (total-cost) (f))"

@@ -16,10 +16,10 @@ from confab.planner.plan import Limits, Status
 from confab.reasoner.generate import families, generate, write_scene
 from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, load
 from confab.reasoner.language import DomainError
+from confab.reasoner.problem import Problem
 from confab.reasoner.reading.goals import with_goals
 from confab.reasoner.reading.problem import read
 from confab.reasoner.reading.relevance import recognise
-from confab.reasoner.symbols import Problem
 from tests.ontology.faults import skeleton
 from tests.reasoner.worlds import HEAD, graph_of, worlds
 

@@ -7,6 +7,9 @@ import pytest
 
 from confab.reasoner import symbols
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, Quantity
+from confab.reasoner.effects import allowed, spread
+from confab.reasoner.language import substituted
+from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -20,7 +23,6 @@ from confab.reasoner.symbols import (
     Fact,
     GroundBehavior,
     Parameter,
-    Problem,
     RelationCondition,
     Rule,
     SituationType,
@@ -28,9 +30,6 @@ from confab.reasoner.symbols import (
     ValueCondition,
     ValueEffect,
     Witness,
-    allowed,
-    spread,
-    substituted,
 )
 from worlds.writing import becomes, behavior, has, lacks, world
 
