@@ -38,10 +38,13 @@ SHARES = {
     "repeated": 0.2,
     "nested": 0.1,
     "negated": 0.15,
+    "wished": 0.1,
+    "several": 0.1,
 }
 """Shares of worlds with a constraint on every state, with situation types that define each other, with costs that depend on
 amounts, with a goal about all individuals of a class, with behaviours that change a situation type by several effects, with
-totals of totals, and with goals that exclude a value or an amount."""
+totals of totals, with goals that exclude a value or an amount, with soft goals that aren't among the goals, and with several
+constraints on every state or on the order of states."""
 SHRUNK = 2
 """Number of worlds that each process shrinks for each kind of fault."""
 SHOWN, MUTANTS = 6, 100

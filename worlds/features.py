@@ -175,7 +175,7 @@ FEATURES: Mapping[str, Callable[[RandomWorld], Problem]] = {
         lambda world, one: isinstance(one, ValueCondition) and one.situation in world.pairs
     ),
     "situation types of several arguments": _without_conditions(
-        lambda world, one: isinstance(one, ValueCondition) and not world.owners[one.situation]
+        lambda world, one: isinstance(one, ValueCondition) and not world.owners.get(one.situation, True)
     ),
     "rules": _without_rules(lambda world, name: name not in world.axioms),
     "rules of one negated condition": _without_rules(_negative),

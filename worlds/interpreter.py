@@ -165,6 +165,12 @@ class Interpreter:
         other.rests = other.unsettled()
         return other
 
+    def without_weights(self) -> Interpreter:
+        """Return an interpreter of the same problem without weights, in which only goals release symbols from rest values."""
+        other = copy(self)
+        other.problem = replace(self.problem, weights={})
+        return other
+
     # ------------------------------------------------------------------------------------------------------ conditions
 
     def bindings(self, conditions: Iterable[Condition], kinds: Terms, terms: Terms) -> Iterator[Terms]:

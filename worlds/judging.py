@@ -11,7 +11,7 @@ import re
 import signal
 import warnings
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -45,7 +45,8 @@ from worlds.interpreter import Interpreter, State, TooManyStatesError
 from worlds.mixed import RandomWorld, crowded
 from worlds.scenes import scene
 from worlds.slices import Slice
-from worlds.walking import cost, faults
+from worlds.walking import cost, executed, faults
+from worlds.wishes import WEIGHTS, choices, least_costs, least_total, softened
 
 SECONDS, CPU, PROVING, COMPARING = 3.0, 4.0, 15.0, 30.0
 """Time limit of a call in seconds; CPU seconds after which a call counts as endless; the same for a search for one certificate,
@@ -70,8 +71,10 @@ SLICED = 25
 """Number of reachable states in which behaviours in a part of a world are compared with those in the world."""
 FEW_CASES = 30
 """Maximum number of cases of a certificate that is corrupted, so that its checks take little time."""
-WEIGHTS = "1/2", "1", "2", "3", "5"
-"""Weights of soft goals."""
+SOFT_MODES: dict[str, dict[str, Any]] = {
+    "soft": {}, "soft optimal": {"optimal": True}, "soft paper": {"mode": "paper"}, "soft strict": {"leave_levels": False},
+}  # fmt: skip
+"""Options of planning with soft goals."""
 EXACT = 1e-9
 """Largest difference of costs that are equal except for the rounding of floating-point numbers."""
 T = TypeVar("T")
@@ -297,7 +300,7 @@ class Judge:
             self.proofs(read)
         if self.sampled(STEPS, "steps", "steps"):
             self.fewest_steps(read)
-        if self.sampled(SOFT, "soft", "soft"):
+        if self.world.wishes or self.sampled(SOFT, "soft", "soft"):
             self.soft_goals(file)
         if self.sampled(EXPORTS, "export", "export"):
             for level in self.world.problem.domain.levels:
@@ -374,38 +377,101 @@ class Judge:
             )
 
     def soft_goals(self, file: Path) -> None:
-        """Plan with some of the goals as soft goals, and compare the outcomes with the exhaustive search of each choice."""
-        rng, problem = Random(f"soft {self.world.seed}"), self.world.problem
-        weights = {symbol: Fraction(rng.choice(WEIGHTS)) for symbol in problem.goal if rng.random() < 0.7}
-        if not weights:
+        """Plan with soft goals, and compare the outcomes with the exhaustive search of each choice of soft goals.
+
+        Soft goals are some of the goals, and the wishes of the world.
+        """
+        rng, world = Random(f"soft {self.world.seed}"), self.world
+        weights = {symbol: Fraction(rng.choice(WEIGHTS)) for symbol in world.problem.goal if rng.random() < 0.7}
+        problem = softened(world.problem, world.wishes, weights)
+        if not problem.weights:
             return
-        file.write_text(scene(replace(self.world, problem=replace(problem, weights=weights))), encoding="utf-8")
-        totals = list[float]()
-        for number in range(2 ** len(weights)):
-            unmet = [symbol for at, symbol in enumerate(weights) if number >> at & 1]
-            try:
-                goal = {symbol: value for symbol, value in problem.goal.items() if symbol not in unmet}
-                least = self.meant.wanting(goal).explored(problem.domain.levels[-1], MOST).least
-            except TooManyStatesError:
-                return
-            totals += [] if least is None else [float(least) + float(sum(weights[symbol] for symbol in unmet))]
-        read = load(file)
-        for mode, optimal in (("soft", False), ("soft optimal", True)):
-            call = partial(plan, read, engine=NO_ENGINE, time_limit=SECONDS, optimal=optimal)
-            result = self.call(mode, call)
-            if result is None:
-                continue
-            outcome, self.found.status[mode] = result.outcome, result.outcome.status.value
-            if outcome.status is Status.UNSOLVABLE and totals:
-                self.complain("false unsolvable", mode)
-            if outcome.plan is not None:
-                goal = {symbol: value for symbol, value in problem.goal.items() if symbol not in outcome.unmet}
-                meant = self.meant.wanting(goal)
-                if wrong := faults(meant, outcome.plan):
-                    self.complain("invalid plan", mode, wrong[0])
-                unmet_weights = float(sum(weights[symbol] for symbol in outcome.unmet))
-                own = float(cost(meant, outcome.plan)) + unmet_weights
-                self.bound(mode, outcome.bound, min(totals, default=math.inf), own)
+        file.write_text(scene(replace(world, problem=problem)), encoding="utf-8")
+        soft = Interpreter(problem)
+        try:
+            costs = least_costs(soft, MOST)
+        except TooManyStatesError:
+            return
+        read = self.call("load with soft goals", lambda: load(file))
+        if read is None:
+            return
+        for mode, options in SOFT_MODES.items():
+            call = partial(plan, read, engine=NO_ENGINE, time_limit=SECONDS, **options)
+            if (result := self.call(mode, call)) is not None:
+                self.found.status[mode] = result.outcome.status.value
+                self.soft_outcome(mode, result.outcome, soft, costs)
+        if self.sampled(EXPORTS, "export", "soft"):
+            self.soft_export(read, soft)
+
+    def soft_outcome(
+        self, mode: str, outcome: Outcome, soft: Interpreter, costs: Mapping[frozenset[Symbol], Fraction]
+    ) -> None:
+        """Compare an outcome for soft goals with the least total, and its penalty with the goals that hold in the end.
+
+        `costs` are the least costs of the choices of soft goals. The stated cost of meeting an unmet goal must suffice.
+        """
+        problem, least = soft.problem, least_total(costs, soft.problem.weights)
+        if outcome.status is Status.UNSOLVABLE and least is not None and mode != "soft strict":
+            self.complain("false unsolvable", mode)
+        if outcome.plan is None:
+            return
+        spent, end = executed(soft, outcome.plan)
+        unmet = {s: weight for s, weight in problem.weights.items() if not soft.meets(end, s, problem.goal[s])}
+        meant = soft.without_weights().wanting({s: value for s, value in problem.goal.items() if s not in unmet})
+        if wrong := faults(meant, outcome.plan):
+            self.complain("invalid plan", mode, wrong[0])
+            return
+        if outcome.penalty != sum(unmet.values()) or outcome.penalty != sum(one.weight for one in outcome.forgone):
+            self.complain("wrong penalty", mode, f"{outcome.penalty} and {outcome.unmet}, but unmet are {unmet}")
+        own = float(spent) + float(sum(unmet.values()))
+        if least is None or own < float(least) - EXACT:
+            self.complain("a total below the least", mode, f"{own}, {least}")
+        self.bound(mode, outcome.bound, math.inf if least is None else float(least), own)
+        for one in outcome.forgone:
+            if one.fact.symbol in unmet:
+                met = problem.weights.keys() - unmet.keys() | {one.fact.symbol}
+                more = [cost for kept, cost in costs.items() if kept >= met]
+                if one.price is not None and not (more and float(spent + one.price) >= float(min(more)) - EXACT):
+                    self.complain("a soft goal costs more", mode, f"{one}, but {min(more, default=None)} - {spent}")
+                if one.price is None and "no plan meets" in one.why and more:
+                    self.complain("a soft goal can be met", mode, f"{one}, but at cost {min(more)}")
+
+    def soft_export(self, read: Scene, soft: Interpreter) -> None:
+        """Export the lowest level of a task with soft goals as PDDL, import it, and compare the least totals."""
+        from confab.reasoner.pddl.exporting import to_pddl
+        from confab.reasoner.pddl.importing import imported
+        from confab.reasoner.pddl.syntax import parse
+
+        mode, problem = "export soft", soft.problem
+
+        def back() -> Problem:
+            exported = to_pddl(read.problem)
+            return imported(parse(exported.domain, exported.problem)).problem
+
+        again = self.call(mode, back)
+        if again is None:
+            return
+        try:
+            got = least_total(least_costs(Interpreter(again), 4 * MOST), again.weights)
+            states = soft.without_weights().wanting({}).explored(problem.domain.levels[-1], MOST, rests=False).costs
+        except TooManyStatesError:
+            return
+        costs: dict[frozenset[Symbol], Fraction] = {}
+        kinds, hard = problem.domain.situations, problem.goal.keys() - problem.weights.keys()
+        for kept in choices(problem.weights):
+            flat = soft.without_weights().wanting({s: v for s, v in problem.goal.items() if s in hard | kept})
+            rested = {s: rest for s in soft.slots if (rest := kinds[s.situation].rest) is not None}
+            rested = {
+                s: rest
+                for s, rest in rested.items()
+                if soft.initial[soft.slots[s]] == rest and not flat.problem.releases(s)
+            }
+            whole = flat.wanting({**rested, **flat.problem.goal})
+            some = [Fraction(cost) for (state, _), cost in states.items() if whole.wanted(state)]
+            costs |= {kept: min(some)} if some else {}
+        wanted = least_total(costs, problem.weights)
+        if wanted != got:
+            self.complain("export means something else", mode, f"least {wanted}, exported {got}")
 
     def certificate(self, mode: str, outcome: Outcome) -> None:
         """Compare a certificate of unsolvability with all reachable states."""
@@ -502,7 +568,11 @@ class Judge:
 
     def other_goal(self, states: list[State]) -> tuple[Interpreter, list[str]]:
         """Return an interpreter of the world with another goal, from a state, and the text of the goal."""
-        symbols = [s for s, slot in self.meant.slots.items() if slot < self.meant.stated and not self.amount(s)]
+        symbols = [
+            s
+            for s, slot in self.meant.slots.items()
+            if slot < self.meant.stated and not self.amount(s) and not self.meant.kinds[s.situation].added
+        ]
         if not symbols:
             return self.meant, []
         changed = [s for s in symbols if self.meant.value(states[0], s) != self.meant.value(self.meant.initial, s)]

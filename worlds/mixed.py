@@ -43,8 +43,10 @@ from confab.reasoner.symbols import (
     ValueEffect,
     Witness,
 )
+from worlds.constraining import with_constraints
 from worlds.interpreter import Interpreter, State, TooManyStatesError
 from worlds.phrases import HIGHEST, Phrases, Vocabulary, contrary, named
+from worlds.wishes import Wish, wishes
 
 MOST = 300
 """Maximum number of reachable nodes of the lowest level in most worlds."""
@@ -74,7 +76,7 @@ class RandomWorld:
 
     `pairs` are the situation types whose property takes several values. `owners` maps each situation type to the classes that
     have it. `axioms` has the property axioms that define situation types instead of rules. `updates` are the behaviours that are
-    written as SPARQL updates.
+    written as SPARQL updates. `wishes` are further goals, which only the task with soft goals has.
     """
 
     seed: int
@@ -84,6 +86,7 @@ class RandomWorld:
     pairs: frozenset[str] = frozenset()
     axioms: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     updates: frozenset[str] = frozenset()
+    wishes: tuple[Wish, ...] = ()
 
 
 def mixed(seed: int, aggregated: float = AGGREGATED, **shares: float) -> RandomWorld:
@@ -102,17 +105,20 @@ def drawn(
     repeated: float = 0.0,
     nested: float = 0.0,
     negated: float = 0.0,
+    wished: float = 0.0,
+    several: float = 0.0,
 ) -> tuple[RandomWorld, Interpreter]:
     """Return the random world of a seed, and an interpreter of the world.
 
     Parameters
     ----------
     seed : int
-    aggregated, constrained, remembered, mutual, priced, everyone, repeated, nested, negated : float
+    aggregated, constrained, remembered, mutual, priced, everyone, repeated, nested, negated, wished, several : float
         The shares of worlds with derived amounts, with constraints on every state, with remembered situation types, with two
         situation types that define each other, with behaviours whose costs depend on amounts, with a goal about all individuals
         of a class, with behaviours that change a situation type by several effects, with bounds or constraints on totals of
-        totals, and with goals that exclude a value or an amount.
+        totals, with goals that exclude a value or an amount, with soft goals that aren't among the goals, and with several
+        constraints on every state or on the order of states.
     """
     rng = Random(f"mixed {seed}")
     most, least = (MOST, FEW if rng.random() < 0.5 else 2) if rng.random() > UNBOUNDED else (MOST // 10, 0)
@@ -120,6 +126,7 @@ def drawn(
         world = _Draft(
             rng, seed, aggregated, constrained, remembered, mutual, priced, repeated=repeated, nested=nested
         ).world()
+        world = replace(world, problem=with_constraints(seed, world.problem, several))
         interpreter = Interpreter(world.problem)
         try:
             costs = interpreter.explored(world.problem.domain.levels[-1], most, False).costs
@@ -132,7 +139,9 @@ def drawn(
         goal = _Wishes(rng, interpreter, {node[0]: cost for node, cost in costs.items()}).goal(rng.random() < EXCLUDED)
         if goal:
             meant = _of_everyone(seed, interpreter.wanting(goal), everyone)
-            return _with_excluded(*_with_derived_goal(replace(world, problem=meant.problem), meant), negated)
+            wanted = wishes(seed, meant, [state for state, _ in costs], wished)
+            world = replace(world, problem=meant.problem, wishes=wanted)
+            return _with_excluded(*_with_derived_goal(world, meant), negated)
 
 
 def crowded(seed: int, constrained: float = 0.0) -> tuple[RandomWorld, Interpreter, list[State]]:
@@ -306,9 +315,9 @@ class _Wishes:
         return dict(sorted(found.items()))
 
     def wished(self, symbol: Symbol) -> bool:
-        """Return whether a goal may name a symbol, which must be no maximum or minimum."""
+        """Return whether a goal may name a symbol: no maximum or minimum, and none of a situation type that Confab adds."""
         aggregate = self.of.problem.domain.aggregates.get(symbol.situation)
-        return aggregate is None or aggregate.kept
+        return (aggregate is None or aggregate.kept) and not self.of.kinds[symbol.situation].added
 
     def random(self, symbol: Symbol) -> object:
         kind = self.of.kinds[symbol.situation]

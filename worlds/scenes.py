@@ -29,6 +29,7 @@ from confab.reasoner.symbols import (
 )
 from confab.reasoner.updates.writing import Situations, update
 from confab.reasoner.vocabulary import ARGUMENTS
+from worlds.constraining import stated
 from worlds.mixed import RandomWorld
 from worlds.phrases import ANYONE, EACH
 
@@ -75,13 +76,13 @@ class _Scene:
     def lines(self) -> Iterator[str]:
         yield from self.classes()
         for one in self.situations.values():
-            if one.arguments != (TASK,):
+            if one.arguments != (TASK,) and not one.added:
                 yield from self.situation(one)
         for relation, kind in (("near", "owl:ObjectProperty"), ("size", "owl:DatatypeProperty")):
             if relation in self.problem.relations:
                 yield self.node(relation, f"{kind}, owl:NamedIndividual, c:Relation")
         for name, rules in self.problem.domain.rules.items():
-            if self.situations[name].arguments == (TASK,):
+            if self.situations[name].arguments == (TASK,) or self.situations[name].added:
                 continue
             yield from self.world.axioms.get(name, ())
             for number, rule in enumerate(() if name in self.world.axioms else rules):
@@ -122,8 +123,7 @@ class _Scene:
         derived = {*domain.rules, *domain.aggregates, *domain.remembers}
         said = [f"c:fromLevel {one.level}"] if one.level != 1 and name not in derived else []
         said += [f"c:restValue {_iri(one.rest)}"] if one.rest is not None else []
-        constraint = self.problem.domain.constraints.get(f"{name}.exceptions")
-        said += [f"c:{'always' if constraint.always else 'never'} true"] if constraint is not None else []
+        said += stated(self.problem, name)
         quantity = one.quantity
         if quantity is None and one.default not in (None, FALSE, one.rest):
             said.append(f"c:defaultValue {_iri(str(one.default))}")
@@ -233,7 +233,7 @@ class _Scene:
         properties = {
             name: name.lower()
             for name, its in self.situations.items()
-            if self.world.owners[name] and (name in self.world.pairs or not its.boolean)
+            if self.world.owners.get(name) and (name in self.world.pairs or not its.boolean)
         }
         try:
             return update(one, Situations(properties, self.world.pairs), _iri)
@@ -276,6 +276,11 @@ class _Scene:
             case Comparison(Amount(situation, arguments), "=", Fraction() as limit, True):
                 said = [f"c:situationType :{situation}", *self.arguments(arguments), f"c:amount {_decimal(limit)}"]
                 return self.part("Comparison", *said, 'c:sign "="', "c:negated true")
+            case Comparison(Amount(situation, arguments), sign, Fraction() as limit, False) if self.rng.random() < 0.5:
+                said = [f"c:situationType :{situation}", *self.arguments(arguments), f"c:amount {_decimal(limit)}"]
+                return self.part("Comparison", *said, f'c:sign "{sign}"')
+            case AnyOf((group,), False) if len(group) > 1:
+                return self.part("AllOf", f"c:condition {', '.join(self.condition(each) for each in group)}")
             case _:
                 return self.condition(one)
 
@@ -397,9 +402,14 @@ class _Scene:
             weight = self.problem.weights.get(symbol)
             soft = [] if weight is None else [f"c:weight {_decimal(weight)}"]
             if symbol.arguments == ("task",):
+                name, _, member = symbol.situation.partition(".")
+                if member not in ("", "0"):
+                    continue  # one node states a wish about all individuals of a class
                 (rule,) = self.problem.domain.rules[symbol.situation]
-                goals.append(f":{symbol.situation}")
-                node = self.wish(rule.conditions[0])
+                goals.append(f":{name}")
+                node = self.wish(
+                    self.world.wishes[int(name.removeprefix("wish"))].condition if member else rule.conditions[0]
+                )
                 self.nodes[-1] = (
                     " ; ".join([self.nodes[-1].replace(node, goals[-1], 1).removesuffix(" ."), *soft]) + " ."
                 )

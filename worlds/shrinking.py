@@ -47,6 +47,8 @@ def smaller_worlds(world: RandomWorld) -> Iterator[RandomWorld]:
         rest = {other: its for other, its in domain.behaviors.items() if other != name}
         if rest:
             yield replace(world, problem=replace(problem, domain=replace(domain, behaviors=rest)))
+    for i in range(len(world.wishes)):
+        yield replace(world, wishes=world.wishes[:i] + world.wishes[i + 1 :])
     for symbol in problem.goal if len(problem.goal) > 1 else ():
         yield replace(world, problem=replace(problem, goal={s: v for s, v in problem.goal.items() if s != symbol}))
     for name in domain.situations:
@@ -75,8 +77,9 @@ def smaller_worlds(world: RandomWorld) -> Iterator[RandomWorld]:
         for conditions in _smaller(aggregate.conditions):
             aggregates = {**domain.aggregates, name: replace(aggregate, conditions=conditions)}
             yield replace(world, problem=replace(problem, domain=replace(domain, aggregates=aggregates)))
-    if domain.constraints:
-        yield replace(world, problem=replace(problem, domain=replace(domain, constraints={})))
+    for name in domain.constraints:
+        constraints = {other: its for other, its in domain.constraints.items() if other != name}
+        yield replace(world, problem=replace(problem, domain=replace(domain, constraints=constraints)))
     for name in world.updates:
         yield replace(world, updates=world.updates - {name})
     for symbol, value in problem.initial.items():
@@ -186,7 +189,7 @@ def _without_situation(world: RandomWorld, name: str) -> RandomWorld:
 def without_individual(world: RandomWorld, individual: str) -> RandomWorld | None:
     """Return a world without an individual, or None if the domain, the goal or a value refers to the individual."""
     problem = world.problem
-    if _occurs(individual, (problem.domain, list(problem.goal), list(problem.goal.values()))):
+    if _occurs(individual, (problem.domain, world.wishes, list(problem.goal), list(problem.goal.values()))):
         return None
     if any(value == individual and individual not in symbol.arguments for symbol, value in problem.initial.items()):
         return None
@@ -209,7 +212,7 @@ def _mentioned(name: str, world: RandomWorld) -> bool:
     lines = [line for other, its in world.axioms.items() if other != name for line in its]
     return (
         any(symbol.situation == name for symbol in problem.goal)
-        or _occurs(name, (list(domain.behaviors.values()), rules))
+        or _occurs(name, (list(domain.behaviors.values()), world.wishes, rules))
         or any(f":{name.lower()} " in line for line in lines)
     )
 

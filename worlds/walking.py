@@ -20,13 +20,18 @@ def faults(of: Interpreter, plan: Plan) -> list[str]:
 
 def cost(of: Interpreter, plan: Plan) -> Any:
     """Return the total cost of a plan's steps of the lowest level."""
+    return executed(of, plan)[0]
+
+
+def executed(of: Interpreter, plan: Plan) -> tuple[Any, State]:
+    """Return the total cost of a plan's steps of the lowest level, and the state after the steps or before an inapplicable step."""
     state, total = of.initial, 0
     for step in plan.at_level(of.problem.domain.levels[-1]):
         made = next(of.done(step.behavior, step.arguments, state), None)
         if made is None:
-            return NOTHING
+            return NOTHING, state
         total, state = total + made[0], made[1]
-    return total
+    return total, state
 
 
 class _Walk:

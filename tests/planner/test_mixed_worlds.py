@@ -50,11 +50,13 @@ def test_the_interpreter_agrees_with_the_naive_reading() -> None:
                 assert naive == own, (seed, one.name)
 
 
-@pytest.mark.parametrize("negated", [0.0, 1.0])
-def test_the_scene_of_a_random_world_has_its_goals_and_reachable_states(negated: float, tmp_path: Path) -> None:
+@pytest.mark.parametrize("shares", [{}, {"negated": 1.0}, {"several": 1.0}])
+def test_the_scene_of_a_random_world_has_its_goals_and_reachable_states(
+    shares: dict[str, float], tmp_path: Path
+) -> None:
     """The problem that is read from the file has the same applicable behaviours and reachable states as the drawn world."""
     for seed in SEEDS:
-        world = mixed(seed, negated=negated)
+        world = mixed(seed, **shares)
         file = tmp_path / "w.ttl"
         file.write_text(scene(world), encoding="utf-8")
         known = load(file)
@@ -104,6 +106,21 @@ def test_worlds_whose_situation_types_define_each_other_give_no_wrong_answer(tmp
         wrong += [(seed, one.kind, one.mode, one.text) for one in its.complaints]
     assert not wrong
     assert defined > 1
+
+
+@pytest.mark.usefixtures("unlimited_judge")
+@pytest.mark.parametrize("shares", [{"wished": 1.0}, {"several": 1.0}])
+def test_worlds_with_wishes_or_with_several_constraints_give_no_wrong_answer(
+    shares: dict[str, float], tmp_path: Path
+) -> None:
+    wrong, planned = [], 0
+    for seed in range(1_300_001_010, 1_300_001_016):
+        world, meant = drawn(seed, **shares)
+        its = Judge(world, tmp_path, meant=meant, only="soft" if world.wishes else "").judged()
+        wrong += [(seed, one.kind, one.mode, one.text) for one in its.complaints]
+        planned += "soft" in its.status if world.wishes else len(world.problem.domain.constraints) > 1
+    assert not wrong
+    assert planned > 1
 
 
 @pytest.mark.usefixtures("unlimited_judge")
