@@ -14,11 +14,11 @@ from __future__ import annotations
 
 import heapq
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
-from confab.planner.grounded.derived_arrays import Bit, by_arrays
+from confab.planner.grounded.derived_arrays import Bit, by_arrays, single, union
 
 AT_ONCE, CALLS = 50, 60
 """Number of alternatives that arrays process while Python processes one, and cost of a layer as a number of alternatives.
@@ -45,7 +45,7 @@ class Derived:
         For an alternative of an opposite bit, the list of required bits is empty.
         """
         return [
-            ([] if bit.opposite else [low.bit_length() - 1 for low in _single(way)], bit.mask.bit_length() - 1)
+            ([] if bit.opposite else [low.bit_length() - 1 for low in single(way)], bit.mask.bit_length() - 1)
             for part in self.parts
             for bit in part
             for way in bit.alternatives
@@ -54,7 +54,7 @@ class Derived:
     @cached_property
     def needed(self) -> int:
         """Mask of the bits that alternatives require."""
-        return _union(way for part in self.parts for bit in part for way in bit.alternatives)
+        return union(way for part in self.parts for bit in part for way in bit.alternatives)
 
     @cached_property
     def effort(self) -> int:
@@ -124,8 +124,8 @@ class Derived:
         found: list[list[Bit]] = []
         for part in self.parts:
             own = sum(bit.mask for bit in part)
-            needed = _union(way for bit in part for way in bit.alternatives) & self.mask & ~own
-            mine = 1 + max((height[low] for low in _single(needed)), default=-1)
+            needed = union(way for bit in part for way in bit.alternatives) & self.mask & ~own
+            mine = 1 + max((height[low] for low in single(needed)), default=-1)
             height |= {bit.mask: mine for bit in part}
             found += [[] for _ in range(mine + 1 - len(found))]
             found[mine] += part
@@ -151,13 +151,13 @@ class Derived:
         known = self._supports.get(bits)
         if known is None:
             found: set[int] = set()
-            waiting = [self._part_of[low] for low in _single(bits)]
+            waiting = [self._part_of[low] for low in single(bits)]
             while waiting:
                 number = waiting.pop()
                 if number not in found:
                     found.add(number)
-                    needed = _union(way for bit in self.parts[number] for way in bit.alternatives)
-                    waiting += [self._part_of[low] for low in _single(needed & self.mask)]
+                    needed = union(way for bit in self.parts[number] for way in bit.alternatives)
+                    waiting += [self._part_of[low] for low in single(needed & self.mask)]
             known = self._supports[bits] = tuple(sorted(found))
         return known
 
@@ -178,7 +178,7 @@ class Derived:
         for number in self._support(wanted & self.mask):
             part = self.parts[number]
             own = sum(bit.mask for bit in part)
-            if changing & ~own & _union(way for bit in part for way in bit.alternatives):
+            if changing & ~own & union(way for bit in part for way in bit.alternatives):
                 changing |= own
                 parts.append(part)
         fixed = state & ~changing
@@ -208,11 +208,8 @@ class Derived:
         for number, part in enumerate(self.parts):
             own = sum(bit.mask for bit in part)
             entry = (number, own, part[0].opposite) if len(part) == 1 else (number, 0, False)
-            needed = 0
-            for bit in part:
-                for wanted in bit.alternatives:
-                    needed |= wanted
-            for low in _single(needed & ~own):
+            needed = union(wanted for bit in part for wanted in bit.alternatives)
+            for low in single(needed & ~own):
                 found[low][entry] = None
         return {low: tuple(numbers) for low, numbers in found.items()}
 
@@ -225,13 +222,6 @@ class Derived:
     @cached_property
     def _needed(self) -> int:
         return sum(self._users)
-
-
-def _single(mask: int) -> Iterable[int]:
-    while mask:
-        low = mask & -mask
-        mask ^= low
-        yield low
 
 
 def _work(part: tuple[Bit, ...]) -> Callable[[int], int]:
@@ -257,7 +247,7 @@ def _by_counting(part: tuple[Bit, ...]) -> Callable[[int], int]:
     ways: dict[int, list[tuple[tuple[int, ...], int]]] = defaultdict(list)  # alternatives by bits of other parts
     for bit in part:
         for way in bit.alternatives:
-            ways[way & ~own].append((tuple(_single(way & own)), bit.mask))
+            ways[way & ~own].append((tuple(single(way & own)), bit.mask))
 
     def work(state: int) -> int:
         state &= ~own
@@ -295,7 +285,7 @@ def in_parts(bits: Mapping[int, Bit]) -> Derived:
     bits = {number: bit if bit.opposite else _grounded(bit) for number, bit in bits.items()}
     numbers = {bit.mask: number for number, bit in bits.items()}
     needs = {
-        number: [numbers[low] for low in _single(_union(bit.alternatives)) if low in numbers]
+        number: [numbers[low] for low in single(union(bit.alternatives)) if low in numbers]
         for number, bit in bits.items()
     }
     index: dict[int, int] = {}
@@ -339,10 +329,3 @@ def in_parts(bits: Mapping[int, Bit]) -> Derived:
 
 def _grounded(bit: Bit) -> Bit:
     return replace(bit, alternatives=tuple(way for way in bit.alternatives if not way & bit.mask))
-
-
-def _union(masks: Iterable[int]) -> int:
-    found = 0
-    for mask in masks:
-        found |= mask
-    return found

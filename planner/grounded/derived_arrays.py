@@ -5,7 +5,7 @@ The arrays of a layer contain the alternatives of the layer's bits.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from itertools import chain
@@ -39,8 +39,8 @@ def by_arrays(layers: Sequence[Sequence[Bit]]) -> Callable[[int], int]:
     The bits of a layer depend only on bits of earlier layers and of the same layer.
     """
     bits = list(chain(*layers))
-    own = reduce(or_, (bit.mask for bit in bits))
-    size = reduce(or_, (way for bit in bits for way in bit.alternatives), own).bit_length()
+    own = union(bit.mask for bit in bits)
+    size = (own | union(way for bit in bits for way in bit.alternatives)).bit_length()
     low, length = (1 << size) - 1, size // 8 + 1
     works = [_Layer.of(layer, size) for layer in layers]
 
@@ -71,15 +71,15 @@ class _Layer:
     @staticmethod
     def of(layer: Sequence[Bit], always: int) -> _Layer:
         """Return the arrays of a layer; short rows are filled with `always`, a bit that is always set."""
-        own = reduce(or_, (bit.mask for bit in layer))
-        ways = [(way & ~own, way & own, _numbers(bit.mask)[0]) for bit in layer for way in bit.alternatives]
+        own = union(bit.mask for bit in layer)
+        ways = [(way & ~own, way & own, bit.mask.bit_length() - 1) for bit in layer for way in bit.alternatives]
         ways.sort(key=lambda way: -way[0].bit_count())
         first, *others = _columns([before for before, _, _ in ways], always) or [np.full(len(ways), always)]
         return _Layer(
             [first, *(column[column != always] for column in others)],  # the alternatives are sorted by length
             _columns([inside for _, inside, _ in ways], always),
             np.array([head for _, _, head in ways], np.int64),
-            np.array([_numbers(bit.mask)[0] for bit in layer if bit.opposite], np.int64),
+            np.array([bit.mask.bit_length() - 1 for bit in layer if bit.opposite], np.int64),
         )
 
     def work(self, flags: Flags) -> None:
@@ -103,20 +103,24 @@ def _columns(masks: Sequence[int], always: int) -> list[Ints]:
 
     The arrays are filled with `always` where a mask has fewer bits.
     """
-    lists = [_numbers(mask) for mask in masks]
+    lists = [[low.bit_length() - 1 for low in single(mask)] for mask in masks]
     found = np.full((max(map(len, lists), default=0), len(lists)), always)
     for which, bits in enumerate(lists):
         found[: len(bits), which] = bits
     return list(found)
 
 
-def _numbers(mask: int) -> list[int]:
-    found = []
+def union(masks: Iterable[int]) -> int:
+    """Return the mask of the bits that are set in any of the masks."""
+    return reduce(or_, masks, 0)
+
+
+def single(mask: int) -> Iterable[int]:
+    """Yield a mask of each bit of a mask."""
     while mask:
         low = mask & -mask
         mask ^= low
-        found.append(low.bit_length() - 1)
-    return found
+        yield low
 
 
 def _all_set(flags: Flags, columns: Sequence[Ints]) -> Flags:

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from heapq import heappop, heappush
 from typing import NamedTuple, TypeAlias
 
@@ -24,8 +24,6 @@ from confab.planner.grounded.task import Task, bits_of
 
 MOST_TIMES = 1000
 """Maximum number of repetitions that count for one operator."""
-OF_BYTE = [bits_of(octet) for octet in range(256)]
-"""The positions of the set bits of each byte value."""
 AmountPush: TypeAlias = "tuple[Linear, str, Exact | None]"
 """A difference, the required sign, and the change of the difference by an operator.
 
@@ -53,7 +51,7 @@ def heuristic(task: Task) -> Evaluate:
     once = [0 if owner < 0 else 1 for owner in owners]
     missing = [len(bits) for bits in needs]
     always = [o for o, number in enumerate(missing) if not number]
-    needed_by = _needed_by(needs, task.size)
+    needed_by = by_bit(needs, task.size)
     each = (sum(map(len, needs)) + sum(map(len, adds))) / max(len(needs), 1)
     goal = bits_of(task.goal)
     unreached = [-1] * task.size
@@ -77,7 +75,7 @@ def heuristic(task: Task) -> Evaluate:
     def evaluate(state: int) -> Evaluation | None:
         times, useless = counted(state) if repeated else (once, None)
         left, cost, layer_of, supporter = missing[:], unreached[:], unreached[:], unreached[:]
-        layer = dense_bits(state & low)
+        layer = bits_of(state & low)
         for bit in layer:
             cost[bit] = layer_of[bit] = 0
         reached, applicable, depth, number = always[:], None, 0, 0
@@ -112,19 +110,10 @@ def heuristic(task: Task) -> Evaluate:
         if any(cost[bit] < 0 for bit in goal):
             return None
         chosen: dict[int, tuple[int, int]] = {}  # operator: first layer in which its effect is required, repetitions
-        waiting, seen = goal[:], set(goal)
-        while waiting:
-            bit = waiting.pop()
-            o = supporter[bit]
-            if o >= 0:
-                owner = owners[o]
-                if owner >= 0:
-                    first, often = chosen.get(owner, (depth, 0))
-                    chosen[owner] = min(first, layer_of[bit]), max(often, times[o])
-                for need in needs[o]:
-                    if need not in seen:
-                        seen.add(need)
-                        waiting.append(need)
+        for bit, o in _supported(goal, needs, supporter):
+            if (owner := owners[o]) >= 0:
+                first, often = chosen.get(owner, (depth, 0))
+                chosen[owner] = min(first, layer_of[bit]), max(often, times[o])
         applicable.sort()
         plan = sorted(chosen, key=lambda o: (chosen[o][0], o))
         if repeated:
@@ -142,7 +131,7 @@ def cost_left(task: Task) -> Callable[[int], float]:
     needs, adds, owners, repeated = _relaxed(task)
     costs = [0.0 if owner < 0 else task.costs[owner] for owner in owners]
     masks = [sum(1 << bit for bit in bits) for bits in needs]
-    needed_by = _needed_by(needs, task.size)
+    needed_by = by_bit(needs, task.size)
     low, goal = (1 << task.size) - 1, bits_of(task.goal)
     prices: dict[AmountVector, list[float]] = {}
 
@@ -166,7 +155,7 @@ def cost_left(task: Task) -> Callable[[int], float]:
         absent = low & ~state
         open_ = [(mask & absent).bit_count() for mask in masks]
         reached, supporter = [math.inf] * task.size, [-1] * task.size
-        for bit in dense_bits(state & low):
+        for bit in bits_of(state & low):
             reached[bit] = 0.0
         queue: list[tuple[float, int]] = []
         wanted = {bit for bit in goal if reached[bit]}
@@ -193,32 +182,35 @@ def cost_left(task: Task) -> Callable[[int], float]:
         if wanted:
             return math.inf
         chosen: dict[int, float] = {}
-        waiting, seen = goal[:], set(goal)
-        while waiting:
-            o = supporter[waiting.pop()]
-            if o >= 0:
-                chosen[owners[o]] = max(chosen.get(owners[o], 0.0), price[o])
-                fresh = [bit for bit in needs[o] if bit not in seen]
-                seen.update(fresh)
-                waiting += fresh
+        for _, o in _supported(goal, needs, supporter):
+            chosen[owners[o]] = max(chosen.get(owners[o], 0.0), price[o])
         return sum(chosen.values())
 
     return left
 
 
-def dense_bits(mask: int) -> list[int]:
-    """Return the positions of the bits that are set in a mask; faster than `bits_of` if many bits are set."""
-    octets = mask.to_bytes((mask.bit_length() + 7) // 8, "little")
-    return [8 * i + b for i, octet in enumerate(octets) if octet for b in OF_BYTE[octet]]
-
-
-def _needed_by(needs: Sequence[Sequence[int]], size: int) -> list[list[int]]:
-    """Return the relaxed operators that require each bit."""
+def by_bit(lists: Sequence[Sequence[int]], size: int) -> list[list[int]]:
+    """Return, for each bit, the numbers of the lists that contain the bit."""
     found: list[list[int]] = [[] for _ in range(size)]
-    for o, bits in enumerate(needs):
+    for number, bits in enumerate(lists):
         for bit in bits:
-            found[bit].append(o)
+            found[bit].append(number)
     return found
+
+
+def _supported(
+    goal: Sequence[int], needs: Sequence[Sequence[int]], supporter: Sequence[int]
+) -> Iterator[tuple[int, int]]:
+    """Yield the bits that a relaxed plan reaches for the goal, each with its supporter."""
+    waiting, seen = list(goal), set(goal)
+    while waiting:
+        bit = waiting.pop()
+        o = supporter[bit]
+        if o >= 0:
+            yield bit, o
+            fresh = [need for need in needs[o] if need not in seen]
+            seen.update(fresh)
+            waiting += fresh
 
 
 def _relaxed(task: Task) -> tuple[list[list[int]], list[list[int]], list[int], dict[AmountPush, list[int]]]:

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from functools import cache, reduce
-from operator import or_
+from functools import cache
 from time import perf_counter
 from typing import TypeAlias
 
@@ -42,7 +41,7 @@ def lookahead(task: Task, deadline: float | None = None) -> Callable[[int, Seque
 
     @cache
     def set_by(operator: int) -> int:
-        found = reduce(or_, (set_ for _, _, set_ in task.changes_of(operator)[1]), 0)
+        found = task.set_by(operator)
         return found if task.amounts is None else found | task.amounts.compared & moved()[operator]
 
     @cache

@@ -20,6 +20,7 @@ from collections import defaultdict
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from confab.planner.grounded.derived_arrays import union
 from confab.planner.grounded.exploring import Candidate, OpenList
 from confab.planner.grounded.hff import Evaluate
 from confab.planner.grounded.task import Task
@@ -109,10 +110,7 @@ class Novelty:
         self.work += self.relaxing
         if evaluation is None:
             return None
-        wanted = 0
-        for operator in evaluation.plan:
-            for _, _, set_ in self.task.changes_of(operator)[1]:
-                wanted |= set_
+        wanted = union(map(self.task.set_by, evaluation.plan))
         return node._replace(wanted=wanted & ~node.state)
 
 

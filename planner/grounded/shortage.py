@@ -14,10 +14,10 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property, reduce
-from operator import or_
+from functools import cached_property
 
 from confab.planner.grounded.amounts import Amounts, AmountVector, Exact, Move
+from confab.planner.grounded.derived_arrays import union
 from confab.planner.grounded.task import Task, bits_of
 from confab.planner.plan import Reason
 from confab.reasoner.amounts import written
@@ -136,8 +136,8 @@ class _Sums:
     def undone(self, operator: int, worth: Mapping[int, Fraction]) -> Fraction:
         """Return the worth of the bits that an operator certainly clears."""
         asked, changes = self.task.changes_of(operator)
-        cleared = reduce(or_, (bits for when, bits, _ in changes if not when & ~asked), 0)
-        kept = reduce(or_, (bits for _, _, bits in changes), 0)
+        cleared = union(bits for when, bits, _ in changes if not when & ~asked)
+        kept = self.task.set_by(operator)
         return sum((worth.get(bit, Fraction(0)) for bit in bits_of(asked & cleared & ~kept)), Fraction(0))
 
     def least(self, worth: Mapping[int, Fraction]) -> Fraction:
@@ -150,7 +150,7 @@ class _Sums:
                     (max((least.get(b, Fraction(0)) for b in way), default=Fraction(0)) for way in ways),
                     default=Fraction(0),
                 )
-                serving[bit] = reduce(or_, (serving.get(b, 0) for way in ways for b in way), 0)
+                serving[bit] = union(serving.get(b, 0) for way in ways for b in way)
         groups: list[tuple[int, Fraction]] = []
         for bit in bits_of(self.task.goal):
             if value := least.get(bit, Fraction(0)):

@@ -24,6 +24,7 @@ import numpy as np
 
 from confab.planner.grounded.amounts import Amounts, Linear
 from confab.planner.grounded.derived import Derived
+from confab.planner.grounded.derived_arrays import union
 from confab.planner.grounded.joins import Ints
 from confab.planner.grounded.successors import tree
 from confab.planner.plan import Step
@@ -35,6 +36,8 @@ BitChange = tuple[int, int, int]
 
 The change takes place if all bits of the condition are set.
 """
+OF_BYTE = [[bit for bit in range(8) if octet >> bit & 1] for octet in range(256)]
+"""The positions of the set bits of each byte value."""
 
 
 @dataclass(frozen=True)
@@ -207,6 +210,10 @@ class Task:
             known = self._changes[operator] = self.change(operator)
         return known
 
+    def set_by(self, operator: int) -> int:
+        """Return the mask of the facts that an operator may set."""
+        return union(set_ for _, _, set_ in self.changes_of(operator)[1])
+
     def operators_of(self, steps: Sequence[tuple[str, tuple[str, ...]]]) -> list[int] | None:
         """Return the operators of `steps` (behaviours with arguments), applied in sequence, or None if a step isn't applicable."""
         wanted, named = set(steps), defaultdict(list)
@@ -252,9 +259,5 @@ def bits_of(mask: int) -> list[int]:
     >>> bits_of(0b1010)
     [1, 3]
     """
-    found = []
-    while mask:
-        low = mask & -mask
-        found.append(low.bit_length() - 1)
-        mask ^= low
-    return found
+    octets = mask.to_bytes((mask.bit_length() + 7) // 8, "little")
+    return [8 * i + bit for i, octet in enumerate(octets) if octet for bit in OF_BYTE[octet]]

@@ -19,8 +19,9 @@ from dataclasses import replace
 from time import perf_counter
 
 from confab.planner.grounded.grounding import ground
+from confab.planner.grounded.hff import by_bit
 from confab.planner.grounded.shortest import Estimate, each_goal_alone, shortest
-from confab.planner.grounded.task import Task
+from confab.planner.grounded.task import Task, bits_of
 from confab.planner.hierarchical.planner import SEARCHING, Compiled, compiled
 from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.hierarchical.regrouping import under_the_levels_above
@@ -124,18 +125,10 @@ def lm_cut(task: Task, deadline: float | None = None) -> Estimate:
     needs = [bits or [always] for bits in task.needs.lists()]
     adds = task.adds.lists()
     owners = list(task.owners)
-    needs.append([bit for bit in range(task.size) if task.goal >> bit & 1] or [always])
+    needs.append(bits_of(task.goal) or [always])
     adds.append([end])
     owners.append(-1)
-    needed_by: list[list[int]] = [[] for _ in range(task.size + 2)]
-    added_by: list[list[int]] = [[] for _ in range(task.size + 2)]
-    for o, (needed, added) in enumerate(zip(needs, adds, strict=True)):
-        if not o % 1000 and deadline is not None and perf_counter() > deadline:
-            return lambda state: 0.0
-        for bit in needed:
-            needed_by[bit].append(o)
-        for bit in added:
-            added_by[bit].append(o)
+    needed_by, added_by = by_bit(needs, task.size + 2), by_bit(adds, task.size + 2)
 
     def h_max(facts: list[int], price: list[float]) -> tuple[list[float], list[int]]:
         """Return the h_max value of each bit, and the most expensive precondition of each operator, or -1 if unreachable."""
@@ -163,8 +156,7 @@ def lm_cut(task: Task, deadline: float | None = None) -> Estimate:
         return value, support
 
     def evaluate(state: int) -> float:
-        facts = [bit for bit in range(task.size) if state >> bit & 1]
-        facts.append(always)
+        facts = [*bits_of(state & (1 << task.size) - 1), always]
         price = list(task.costs)
         total = 0.0
         while True:

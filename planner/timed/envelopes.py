@@ -9,13 +9,12 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Sequence, Set
 from dataclasses import replace
-from functools import reduce
 from math import inf
-from operator import or_
 from typing import TypeAlias
 
 import numpy as np
 
+from confab.planner.grounded.derived_arrays import union
 from confab.planner.grounded.task import BitChange, Task, bits_of, grouped
 
 Ends: TypeAlias = "Sequence[int | None]"
@@ -39,14 +38,14 @@ def oversized(task: Task, ends: Ends, lasts: Sequence[int], apart: int, held: Ca
     longest = defaultdict[int, float](float)
     for operator, end in enumerate(ends):
         changes = () if end is None else task.changes_of(end)[1]
-        closed = reduce(or_, (cleared & ~set_ for when, cleared, set_ in changes if not when), 0)
-        for bit in bits_of(_set(task, operator)):
+        closed = union(cleared & ~set_ for when, cleared, set_ in changes if not when)
+        for bit in bits_of(task.set_by(operator)):
             longest[bit] = max(longest[bit], lasts[operator] if closed >> bit & 1 else inf)
     return {
         operator
         for operator, end in enumerate(ends)
         if end is not None
-        for bit in bits_of(held(end) & ~task.initial & ~_set(task, operator))
+        for bit in bits_of(held(end) & ~task.initial & ~task.set_by(operator))
         if bit in longest and lasts[operator] + 2 * apart > longest[bit]
     }
 
@@ -71,7 +70,7 @@ def excluding(task: Task, never: Set[int], running: int) -> Task:
     """Return a task without some begins of steps: they require that their own step is running."""
     if not never:
         return task
-    own = {operator: _set(task, operator) & running & ~task.changes_of(operator)[0] for operator in never}
+    own = {operator: task.set_by(operator) & running & ~task.changes_of(operator)[0] for operator in never}
     needs = [(number, bit) for number, bits in enumerate(task.needs.lists()) for bit in bits]
     needs += [(number, bit) for number, owner in enumerate(task.owners) if owner in own for bit in bits_of(own[owner])]
     pairs = np.array(needs, np.int64).reshape(-1, 2)
@@ -88,8 +87,3 @@ def _without(task: Task, operator: int, bits: int) -> tuple[int, tuple[BitChange
     """Return the precondition and the changes of an operator without some bits."""
     precondition, changes = task.changes_of(operator)
     return precondition & ~bits, tuple((when & ~bits, cleared & ~bits, set_ & ~bits) for when, cleared, set_ in changes)
-
-
-def _set(task: Task, operator: int) -> int:
-    """Return the bits that an operator may set."""
-    return reduce(or_, (set_ for _, _, set_ in task.changes_of(operator)[1]), 0)
