@@ -25,9 +25,10 @@ from typing import TypeAlias
 
 import networkx
 
-from confab.planner.acting.schedule import PartialOrder, partial_order, worker_of, workers_of
+from confab.planner.acting.schedule import PartialOrder, partial_order, worker_of
 from confab.planner.causal_links import FactChange, Need, NeedKind, Purpose, purposes
 from confab.planner.plan import Plan, Step
+from confab.planner.timed.pieces import workers_of
 from confab.planner.validation import BehaviorReader, LoggedState, followed, unmet_goals
 from confab.reasoner.amounts import meets
 from confab.reasoner.limits import check

@@ -51,13 +51,10 @@ class ReadableState(Protocol):
 
 
 class Source(Protocol):
-    """The context for reading conditions: the problem, its relations by position, and the list of lookups."""
+    """The context for reading conditions: the problem and the list of lookups."""
 
     problem: Problem
     lookups: Lookups | None
-
-    def related(self, relation: str, position: int) -> Mapping[str, list[Arguments]]:
-        """Return the tuples of a relation, indexed by the individual at a position."""
 
 
 class ConditionReader:
@@ -176,7 +173,7 @@ class ConditionReader:
                 at = self.place(arguments[known])
 
                 def related(facts: ReadableState, values: Values) -> Iterable[str]:
-                    rows = self.rules.related(relation, known).get(values[at], ())
+                    rows = self.problem.related(relation, known).get(values[at], ())
                     return dict.fromkeys([row[position] for row in rows])
 
                 return related

@@ -117,7 +117,6 @@ class Lowest:
         for symbol, value in problem.initial.items():
             if symbol.situation not in self.changing:
                 self.holders.setdefault(symbol.situation, []).append((symbol.arguments, value))
-        self._rows: dict[tuple[str, int], dict[str, list[tuple[str, ...]]]] = {}
         self._steps: dict[tuple[int, frozenset[str]], list[tuple[Condition, tuple[str, ...]]]] = {}
         self._conjunctions: dict[tuple[int, ...], tuple[Condition, ...]] = {}
         self._kept: list[object] = []  # keeps objects alive, so that Python reuses no id
@@ -160,15 +159,6 @@ class Lowest:
         quantity = self.quantity(situation)
         least, most = (None, None) if quantity is None else (quantity.least, quantity.most)
         return Range(-math.inf if least is None else least, math.inf if most is None else most)
-
-    def rows(self, relation: str, position: int) -> Mapping[str, list[tuple[str, ...]]]:
-        """Return the tuples of a relation, indexed by the individual at a position."""
-        if (relation, position) not in self._rows:
-            found: dict[str, list[tuple[str, ...]]] = {}
-            for row in sorted(self.problem.relations.get(relation, ())):
-                found.setdefault(row[position], []).append(row)
-            self._rows[relation, position] = found
-        return self._rows[relation, position]
 
     def constant(self, condition: Condition) -> bool:
         """Return whether a condition without nested conditions has the same value in all states."""
@@ -431,7 +421,7 @@ class FactEvaluation:
                 if known is None:
                     rows = sorted(self.problem.relations.get(relation, ()))
                 else:
-                    rows = lowest.rows(relation, known).get(env.get(terms[known], terms[known]), ())
+                    rows = lowest.problem.related(relation, known).get(env.get(terms[known], terms[known]), ())
             case EqualityCondition(left, right, False) if len(unknown) == 1 and left != right:
                 terms, other = (unknown[0],), right if left == unknown[0] else left
                 rows = [(env.get(other, other),)]
@@ -476,7 +466,7 @@ class FactEvaluation:
                 return self.between(situation, tuple(env.get(a, a) for a in arguments))
             case Measure(relation, arguments):
                 key = tuple(env.get(a, a) for a in arguments)
-                rows = self.lowest.rows(relation, 0).get(key[0], ()) if key else sorted(
+                rows = self.lowest.problem.related(relation, 0).get(key[0], ()) if key else sorted(
                     self.problem.relations.get(relation, ())
                 )  # fmt: skip
                 found = [Fraction(row[-1]) for row in rows if row[:-1] == key]

@@ -440,7 +440,6 @@ class BehaviorReader:
         self.lookups, self.lifted = lookups, lifted or {}
         self.strata = stratum_of(problem.domain.rules)
         self._read: dict[str, _CompiledBehavior] = {}
-        self._rows: dict[tuple[str, int], dict[str, list[Arguments]]] = {}
         self._defined: dict[str, list[_CompiledBehavior]] = {}
         self.totals = {name: Total(self, one) for name, one in problem.domain.aggregates.items() if one.kept}
         self.bounded = [
@@ -538,15 +537,6 @@ class BehaviorReader:
         if not all_hold(tests, facts, values):
             return None
         return {term: value for term, value in zip(reading.places, values, strict=True) if term in bound}
-
-    def related(self, relation: str, position: int) -> Mapping[str, list[Arguments]]:
-        """Return the tuples of a relation, indexed by the individual at a position."""
-        if (relation, position) not in self._rows:
-            found: dict[str, list[Arguments]] = {}
-            for row in sorted(self.problem.relations.get(relation, ())):
-                found.setdefault(row[position], []).append(row)
-            self._rows[relation, position] = found
-        return self._rows[relation, position]
 
 
 class _CompiledBehavior:

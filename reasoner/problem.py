@@ -196,6 +196,18 @@ class Problem:
         """Return the members of a class as a set."""
         return self._members.get(kind, frozenset())
 
+    def related(self, relation: str, position: int) -> Mapping[str, list[tuple[str, ...]]]:
+        """Return the tuples of a relation, indexed by the individual at a position."""
+        if (relation, position) not in self._related:
+            found = self._related[relation, position] = {}
+            for row in sorted(self.relations.get(relation, ())):
+                found.setdefault(row[position], []).append(row)
+        return self._related[relation, position]
+
+    @cached_property
+    def _related(self) -> dict[tuple[str, int], dict[str, list[tuple[str, ...]]]]:
+        return {}
+
     def superclasses(self, kind: str) -> set[str]:
         """Return a class with all its superclasses."""
         return closure([kind], lambda each: self.parents.get(each, ()))

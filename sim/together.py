@@ -14,9 +14,10 @@ from threading import Semaphore, Thread
 import numpy as np
 import pybullet
 
-from confab.planner.acting.schedule import WorkerSlot, partial_order, ready, urgency_of, worker_of, workers_of
+from confab.planner.acting.schedule import WorkerSlot, partial_order, ready, urgency_of, worker_of
 from confab.planner.acting.world import INTERRUPTED
 from confab.planner.plan import Step
+from confab.planner.timed.pieces import workers_of
 from confab.reasoner.problem import Problem
 from confab.sim.engine import Engine
 from confab.sim.verdict import SkillError, Verdict

@@ -10,8 +10,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from confab.planner.acting.schedule import worker_of, workers_of
+from confab.planner.acting.schedule import worker_of
 from confab.planner.plan import Plan, Step
+from confab.planner.timed.pieces import workers_of
 from confab.planner.validation import successor
 from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import FALSE, Span, State, Symbol

@@ -64,15 +64,6 @@ def partial_order(problem: Problem, primitives: Sequence[Step]) -> PartialOrder:
     return reduced
 
 
-def workers_of(problem: Problem) -> frozenset[str]:
-    """Return the workers: the individuals with a situation type that has a rest value.
-
-    A worker executes one primitive at a time.
-    """
-    kinds = {s.arguments[0] for s in problem.domain.situations.values() if s.rest is not None and s.arguments}
-    return frozenset(individual for kind in kinds for individual in problem.classes.get(kind, ()))
-
-
 def ready(
     order: PartialOrder,
     primitives: Sequence[Step],

@@ -118,11 +118,15 @@ def actors_of(problem: Problem, behavior: Behavior, arguments: Arguments, restin
 
 
 def default_actors(problem: Problem) -> frozenset[str]:
+    """Return the workers of a problem, or no individuals if some behaviour names its actors."""
+    named = any(timing_of(behavior).actors for behavior in problem.domain.behaviors.values())
+    return frozenset() if named else workers_of(problem)
+
+
+def workers_of(problem: Problem) -> frozenset[str]:
     """Return the individuals whose class is the first argument of a situation type with a rest value.
 
-    Return no individuals if some behaviour names its actors.
+    A worker executes one primitive at a time.
     """
-    if any(timing_of(behavior).actors for behavior in problem.domain.behaviors.values()):
-        return frozenset()
     kinds = {s.arguments[0] for s in problem.domain.situations.values() if s.rest is not None and s.arguments}
     return frozenset(individual for kind in kinds for individual in problem.classes.get(kind, ()))

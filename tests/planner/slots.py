@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-from confab.planner.acting.schedule import WorkerSlot, partial_order, ready, urgency_of, worker_of, workers_of
+from confab.planner.acting.schedule import WorkerSlot, partial_order, ready, urgency_of, worker_of
 from confab.planner.plan import Step
+from confab.planner.timed.pieces import workers_of
 from confab.reasoner.problem import Problem
 
 

@@ -189,10 +189,10 @@ def test_individuals_that_satisfy_conditions_are_returned() -> None:
 
 
 def test_relations_are_indexed_by_each_argument() -> None:
-    rules = BehaviorReader(shelves())
-    assert rules.related("above", 0) == {"high": [("high", "low")], "low": [("low", "floor")]}
-    assert rules.related("above", 1) == {"low": [("high", "low")], "floor": [("low", "floor")]}
-    assert rules.related("none", 0) == {}
+    problem = shelves()
+    assert problem.related("above", 0) == {"high": [("high", "low")], "low": [("low", "floor")]}
+    assert problem.related("above", 1) == {"low": [("high", "low")], "floor": [("low", "floor")]}
+    assert problem.related("none", 0) == {}
 
 
 def step(level: int, name: str = "DO", *arguments: str, id: int = 0) -> Step:
