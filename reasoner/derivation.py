@@ -12,6 +12,7 @@ from confab.reasoner.amounts import situations_in
 from confab.reasoner.closure import closure
 from confab.reasoner.language import groups
 from confab.reasoner.problem import Domain, Problem
+from confab.reasoner.sentences import plain
 from confab.reasoner.symbols import (
     FALSE,
     AnyOf,
@@ -19,7 +20,6 @@ from confab.reasoner.symbols import (
     Comparison,
     Condition,
     EqualityCondition,
-    Fact,
     RelationCondition,
     Rule,
     Symbol,
@@ -47,12 +47,9 @@ def deciding(problem: Problem, goal: Symbol) -> ValueCondition:
 
 
 def said_by(problem: Problem, goal: Symbol) -> str:
-    """Return a goal with a deadline as text.
-
-    The text is the fact that decides whether the goal holds, after *not* if the fact must not hold.
-    """
-    wanted = deciding(problem, goal)
-    return f"{'not ' * wanted.negated}{Fact(Symbol(wanted.situation, wanted.arguments), wanted.value)}"
+    """Return a goal with a deadline as text, in the names of the ontology."""
+    stated = (ValueCondition(goal.situation, goal.arguments, problem.goal[goal]),)
+    return " and ".join(map(plain, conditions_of_goal(problem.domain, goal) or stated))
 
 
 def needed(conditions: Sequence[Condition], negated: bool = False) -> Iterator[tuple[str, bool]]:

@@ -308,7 +308,7 @@ class _RunningEpisode:
         """Say once that the deadline of a goal can't be kept any more."""
         if goal not in self.late:
             self.late[goal] = now
-            self.say("late", text=f"the deadline of {goal} can't be kept any more")
+            self.say("late", text=f"the deadline of {said_by(self.belief.problem, goal)} can't be kept any more")
 
     def perform_together(self, left: Remaining) -> None:
         """Execute the remaining primitives with all actors at once, until all have ended or something unexpected happens.

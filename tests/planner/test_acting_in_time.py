@@ -81,7 +81,7 @@ def test_a_deadline_that_no_schedule_keeps_is_given_up_at_the_beginning_and_the_
     problem = with_times(deadlines={FILLED: Fraction(5), MOVED: Fraction(20)})
     episode = acted(problem, told=told.append)
     assert [(event.seconds, event.text) for event in told if event.what == "late"] == [
-        (0, "the deadline of <cup1, BEVERAGE> can't be kept any more")
+        (0, "the deadline of cup1 BEVERAGE beverage1 can't be kept any more")
     ]
     assert episode.status is End.IMPOSSIBLE
     (reason,) = episode.reasons
