@@ -229,6 +229,12 @@ def test_a_count_follows_values_that_a_witness_loses(tmp_path: Path) -> None:
     assert "refused" not in {its.status[mode] for mode in ("guarded", "optimal", "paper")}
 
 
+def test_a_refusal_of_too_many_effects_names_the_constraint_as_the_author_stated_it(tmp_path: Path) -> None:
+    (tmp_path / "world.ttl").write_text(scene(mixed(1_300_010_055, 0.0, repeated=1.0, several=1.0)))
+    with pytest.raises(KnowledgeError, match="determine the constraint that D0 must be true at most once by too many"):
+        load(str(tmp_path / "world.ttl")).plan()
+
+
 @pytest.mark.parametrize("seed", [320_002_517, 320_002_585])
 def test_a_count_with_too_many_conditions_is_refused_immediately(seed: int, tmp_path: Path) -> None:
     (tmp_path / "world.ttl").write_text(scene(mixed(seed)))
