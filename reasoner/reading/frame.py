@@ -393,6 +393,19 @@ def _check_behavior(behavior: Behavior, domain: Domain) -> None:
             )
 
 
+def _check_classes(schema: Parts, iri: str, owners: Sequence[str]) -> None:
+    """Raise `KnowledgeError` if conditions define a class whose individuals have a situation type."""
+    for kind in (*owners, *(schema.one(parameter, "termType") for parameter in schema.values(iri, "parameter"))):
+        if schema.definitions.changes(kind):
+            base = local_name(schema.definitions.base(kind))
+            raise KnowledgeError(
+                f"{local_name(iri)} is a situation type of {local_name(kind)}, but the definition of {local_name(kind)} becomes "
+                f"conditions, which no situation type depends on; make it one of {base}, and require {local_name(kind)} in the "
+                "behaviours",
+                iri,
+            )
+
+
 def _situations(
     schema: Parts, read: OntologySchema, classes: dict[str, tuple[str, ...]]
 ) -> tuple[list[SituationType], dict[str, tuple[str, bool]]]:
@@ -400,7 +413,9 @@ def _situations(
     found, properties = [], {}
     for iri in sorted(read.of_kind("SituationType"), key=schema.names.short):
         name = schema.names.short(iri)
-        owning = [schema.names.short(kind) for kind, situation in read.owners if situation == iri]
+        owners = [kind for kind, situation in read.owners if situation == iri]
+        _check_classes(schema, iri, owners)
+        owning = list(map(schema.names.short, owners))
         parameters = [schema.parameter(p) for p in ordered(schema.values(iri, "parameter"), schema.nodes, schema.names)]
         arguments = tuple(p.kind for p in parameters) or ((_union(owning, classes),) if owning else ())
         value_property = schema.values(iri, "valueProperty")

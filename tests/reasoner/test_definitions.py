@@ -274,3 +274,17 @@ def test_a_static_class_has_the_right_members_even_if_owl_rl_infers_none(
     problem = read(graph).problem
     facts = LoggedState(problem, problem.initial)
     assert {place for place in problem.classes["Place"] if facts.value("ODD", (place,)) == "true"} - {"hook"} == members
+
+
+OF_THE_CLASS = ":Special c:hasSituationType :TIRED . :TIRED a owl:Class, owl:NamedIndividual, c:SituationType ."
+OF_AN_ARGUMENT = (
+    ":TIRED a owl:Class, owl:NamedIndividual, c:SituationType ; c:parameter :TIRED.1 . "
+    ":TIRED.1 a owl:NamedIndividual, c:Parameter ; c:index 1 ; c:termType :Special ."
+)
+
+
+@pytest.mark.parametrize("tired", [OF_THE_CLASS, OF_AN_ARGUMENT])
+def test_a_class_that_becomes_conditions_has_no_situation_type(tmp_path: Path, tired: str) -> None:
+    path = scene(tmp_path, defined(both(":Item", "[ a owl:Class ; owl:complementOf :Sink ]")), tired)
+    with pytest.raises(KnowledgeError, match="TIRED is a situation type of Special, but"):
+        read(load(path))
