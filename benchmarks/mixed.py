@@ -40,11 +40,16 @@ SHARES = {
     "negated": 0.15,
     "wished": 0.1,
     "several": 0.1,
+    "partial": 0.1,
+    "ternary": 0.1,
+    "overlapping": 0.15,
+    "extended": 0.1,
 }
 """Shares of worlds with a constraint on every state, with situation types that define each other, with costs that depend on
 amounts, with a goal about all individuals of a class, with behaviours that change a situation type by several effects, with
-totals of totals, with goals that exclude a value or an amount, with soft goals that aren't among the goals, and with several
-constraints on every state or on the order of states."""
+totals of totals, with goals that exclude a value or an amount, with soft goals that aren't among the goals, with several
+constraints on every state or on the order of states, with numbers that only some pairs have, with situation types of three
+arguments, with classes that share individuals or are defined, and with behaviours that extend others."""
 SHRUNK = 2
 """Number of worlds that each process shrinks for each kind of fault."""
 SHOWN, MUTANTS = 6, 100

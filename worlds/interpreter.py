@@ -134,10 +134,10 @@ class Interpreter:
                 self.slots[Symbol(name, arguments)] = len(initial)
                 initial.append(FALSE)
         self.symbols = list(self.slots)
-        for name in domain.aggregates:
+        for name, aggregate in domain.aggregates.items():
             for arguments in product(*(problem.classes.get(of, ()) for of in self.kinds[name].arguments)):
                 self.slots[Symbol(name, arguments)] = len(initial)
-                initial.append(0)
+                initial.append(0 if aggregate.kept else NOTHING)  # the value outside of the class that the rule names
         self.totals = [made for one in in_order(domain.aggregates) for made in self.aggregated(one)]
         self.rules = [(self.derivations(group), self.recursive(group)) for group in strata(domain.rules)]
         mutual = any(read_by(one) & domain.rules.keys() for one in domain.aggregates.values())

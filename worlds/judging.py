@@ -557,7 +557,14 @@ class Judge:
 
     def crowd(self, file: Path) -> Iterator[Slice]:
         """Yield the comparison of task recognition with the whole scene in a larger world of the same seed."""
-        world, meant, states = crowded(self.world.seed, constrained=0.3)
+        of = self.world.problem
+        alike = {
+            "partial": "way" in of.relations,
+            "ternary": "between" in of.relations,
+            "overlapping": "C" in of.classes,
+        }
+        shares = {name: 1.0 for name, has in alike.items() if has}
+        world, meant, states = crowded(self.world.seed, constrained=0.3, **shares)
         file.write_text(scene(world), encoding="utf-8")
         few = states[:: 1 + len(states) // SLICED]
         yield Slice(load(file).knowledge, (), self.queries(), meant, few, MOST // 100)

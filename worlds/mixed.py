@@ -45,7 +45,9 @@ from confab.reasoner.symbols import (
 )
 from worlds.constraining import with_constraints
 from worlds.interpreter import Interpreter, State, TooManyStatesError
+from worlds.kinds import describe, overlapping
 from worlds.phrases import HIGHEST, Phrases, Vocabulary, contrary, named
+from worlds.tuples import numbers_of_some, of_three
 from worlds.wishes import Wish, wishes
 
 MOST = 300
@@ -76,7 +78,9 @@ class RandomWorld:
 
     `pairs` are the situation types whose property takes several values. `owners` maps each situation type to the classes that
     have it. `axioms` has the property axioms that define situation types instead of rules. `updates` are the behaviours that are
-    written as SPARQL updates. `wishes` are further goals, which only the task with soft goals has.
+    written as SPARQL updates; with `extending`, an update may extend another one. `definitions` has the OWL expressions of
+    classes, and `described` the conditions on a member of a class that situations define. `wishes` are further goals, which only
+    the task with soft goals has.
     """
 
     seed: int
@@ -87,6 +91,9 @@ class RandomWorld:
     axioms: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     updates: frozenset[str] = frozenset()
     wishes: tuple[Wish, ...] = ()
+    extending: bool = False
+    definitions: Mapping[str, str] = field(default_factory=dict)
+    described: Mapping[str, tuple[Condition, ...]] = field(default_factory=dict)
 
 
 def mixed(seed: int, aggregated: float = AGGREGATED, **shares: float) -> RandomWorld:
@@ -107,25 +114,32 @@ def drawn(
     negated: float = 0.0,
     wished: float = 0.0,
     several: float = 0.0,
+    partial: float = 0.0,
+    ternary: float = 0.0,
+    overlapping: float = 0.0,
+    extended: float = 0.0,
 ) -> tuple[RandomWorld, Interpreter]:
     """Return the random world of a seed, and an interpreter of the world.
 
     Parameters
     ----------
     seed : int
-    aggregated, constrained, remembered, mutual, priced, everyone, repeated, nested, negated, wished, several : float
+    aggregated, constrained, remembered, mutual, priced, everyone, repeated, nested, negated, wished, several, partial, ternary, \
+    overlapping, extended : float
         The shares of worlds with derived amounts, with constraints on every state, with remembered situation types, with two
         situation types that define each other, with behaviours whose costs depend on amounts, with a goal about all individuals
         of a class, with behaviours that change a situation type by several effects, with bounds or constraints on totals of
-        totals, with goals that exclude a value or an amount, with soft goals that aren't among the goals, and with several
-        constraints on every state or on the order of states.
+        totals, with goals that exclude a value or an amount, with soft goals that aren't among the goals, with several
+        constraints on every state or on the order of states, with numbers that only some pairs have, with situation types of
+        three arguments, with classes that share individuals or are defined, and with behaviours that extend others.
     """
     rng = Random(f"mixed {seed}")
     most, least = (MOST, FEW if rng.random() < 0.5 else 2) if rng.random() > UNBOUNDED else (MOST // 10, 0)
     while True:
         world = _Draft(
-            rng, seed, aggregated, constrained, remembered, mutual, priced, repeated=repeated, nested=nested
-        ).world()
+            rng, seed, aggregated, constrained, remembered, mutual, priced, repeated=repeated, nested=nested,
+            partial=partial, ternary=ternary, overlapping=overlapping, extended=extended,
+        ).world()  # fmt: skip
         world = replace(world, problem=with_constraints(seed, world.problem, several))
         interpreter = Interpreter(world.problem)
         try:
@@ -144,14 +158,15 @@ def drawn(
             return _with_excluded(*_with_derived_goal(world, meant), negated)
 
 
-def crowded(seed: int, constrained: float = 0.0) -> tuple[RandomWorld, Interpreter, list[State]]:
+def crowded(seed: int, constrained: float = 0.0, **shares: float) -> tuple[RandomWorld, Interpreter, list[State]]:
     """Return a random world with more individuals and a goal of one fact, its interpreter, and the states of a random walk.
 
-    Such a world can have too many states for an exhaustive search.
+    Such a world can have too many states for an exhaustive search. The `shares` are those of worlds with numbers of some pairs,
+    with situation types of three arguments and with overlapping classes.
     """
     rng = Random(f"crowded {seed}")
     while True:
-        world = _Draft(rng, seed, AGGREGATED, constrained, 0.0, 0.0, 0.0, rng.choice((1, 2, 3))).world()
+        world = _Draft(rng, seed, AGGREGATED, constrained, 0.0, 0.0, 0.0, rng.choice((1, 2, 3)), **shares).world()
         domain, classes = world.problem.domain, world.problem.classes
         behaviors = [*domain.behaviors.values(), *(one.behavior for one in domain.aggregates.values())]
         behaviors += [rule.behavior for rules in domain.rules.values() for rule in rules]
@@ -362,18 +377,20 @@ class _Draft(Vocabulary):
         crowd: int = 0,
         repeated: float = 0.0,
         nested: float = 0.0,
+        partial: float = 0.0,
+        ternary: float = 0.0,
+        overlapping: float = 0.0,
+        extended: float = 0.0,
     ) -> None:
         super().__init__(rng)
         self.repeated = Random(f"repeated {seed}").random() < repeated
         self.crowd, self.valued, self.nested = crowd, priced, nested
         self.seed, self.share, self.prevented = seed, aggregated, constrained
         self.remembered, self.connected = remembered, mutual
+        self.some, self.triples, self.overlapping, self.extended = partial, ternary, overlapping, extended
         self.forbidden: list[str] = []  # situation types of which a constraint is drawn
         self.levels = rng.choice((1, 1, 1, 2, 2, 3))
-        self.owners: dict[str, tuple[str, ...]] = {}
         self.pairs: set[str] = set()
-        self.axioms: dict[str, tuple[str, ...]] = {}
-        self.initial: dict[Symbol, str] = {}
         self.made: list[ValueEffect] = []
 
     def chance(self, p: float) -> bool:
@@ -381,9 +398,16 @@ class _Draft(Vocabulary):
 
     def world(self) -> RandomWorld:
         self.individuals()
+        if (own := Random(f"overlapping {self.seed}")).random() < self.overlapping:
+            overlapping(self, own)
         for number in range(self.rng.choice((2, 2, 3, 3, 4, 5))):
             self.situation(number)
         self.static()
+        for what, share, draw in (("partial", self.some, numbers_of_some), ("ternary", self.triples, of_three)):
+            if (own := Random(f"{what} {self.seed}")).random() < share:
+                draw(self, own, self.levels)
+        if self.overlaps and (own := Random(f"described {self.seed}")).random() < 0.6:
+            describe(self, own)
         own = Random(f"aggregates {self.seed}")  # a separate generator keeps worlds without aggregates unchanged
         many = own.choice((1, 1, 2)) if own.random() < self.share else 0
         first = own.random() < 0.5
@@ -395,7 +419,8 @@ class _Draft(Vocabulary):
             self.aggregated(number)
         self.mutual()
         self.remembering()
-        behaviors = self.priced(self.behaviors())
+        extending = (own := Random(f"extended {self.seed}")).random() < self.extended
+        behaviors = self.priced([*(made := self.behaviors()), *(self.extensions(made, own) if extending else ())])
         used = {b.level for b in behaviors}
         self.levels = max(used)
         aggregates = self.aggregates
@@ -411,7 +436,11 @@ class _Draft(Vocabulary):
             problem = self.bounded(problem)
         problem = self.totalled(self.constrained(problem))
         updates = frozenset(b.name for b in behaviors if self.chance(0.5)) if self.chance(UPDATES) else frozenset()
-        return RandomWorld(self.seed, problem, self.parents, self.owners, frozenset(self.pairs), self.axioms, updates)
+        updates = frozenset(b.name for b in behaviors) if extending else updates
+        return RandomWorld(
+            self.seed, problem, self.parents, self.owners, frozenset(self.pairs), self.axioms, updates,
+            extending=extending, definitions=self.definitions, described=self.described,
+        )  # fmt: skip
 
     def individuals(self) -> None:
         rng, number = self.rng, 0
@@ -436,13 +465,17 @@ class _Draft(Vocabulary):
         name = f"{kind}{number}"
         level = rng.choice(range(1, self.levels + 1)) if number else 1
         owner = rng.choice(("A", "A", "B", "A1", "A|B"))
+        owner = self.kind(owner, self.owning) if owner in self.parents else owner
         owners = tuple(owner.split("|"))
         if len(owners) > 1:
             self.classes[owner] = tuple(dict.fromkeys(one for of in owners for one in self.classes[of]))
         arguments: tuple[str, ...] = (owner,)
         if kind in "QGM":
             owners = ()
-            arguments = tuple(rng.choice(("A", "B", "A1")) for _ in range(3 if kind == "Q" and self.chance(0.1) else 2))
+            arguments = tuple(
+                self.kind(rng.choice(("A", "B", "A1")), self.owning)
+                for _ in range(3 if kind == "Q" and self.chance(0.1) else 2)
+            )
         self.owners[name] = owners
         rest: str | None = None
         if kind in "FG":
@@ -474,6 +507,7 @@ class _Draft(Vocabulary):
         rng = self.rng
         members = tuple(f"{name}v{i}" for i in range(rng.choice((2, 2, 3))))
         target = rng.choice(("A", "B", "B") if self.crowd else ("", "", "", "A", "B"))
+        target = self.kind(target) if target else ""
         if target:
             members = members[: rng.choice((0, 1, 1, 2))]
             if len({*members, *self.classes[target]}) < 2:
@@ -871,11 +905,22 @@ class _Draft(Vocabulary):
             conditions += [
                 self.joining(writer, *pair) if self.chance(0.5) else self.joining(writer, *pair[::-1]) for pair in pairs
             ]
+        described = [one for one in map(writer.described, parameters if self.described else ()) if one is not None]
+        if described and self.chance(0.5):
+            conditions.append(self.rng.choice(described))
         if self.made and self.chance(0.6) and (link := writer.link(bound, rng.choice(self.made))):
             conditions.append(link)
         many = rng.choice((1, 1, 2) if self.crowd else (1, 1, 2, 3))
         found = self.with_effects(name, level, writer, parameters, bound, conditions, many)
         self.made += [effect for effect in found.effects if not effect.value.startswith("?")]
+        return found
+
+    def extensions(self, behaviors: Sequence[Behavior], own: Random) -> list[Behavior]:
+        """Return a behaviour of the lowest level with the conditions and effects of another one, and more."""
+        self.rng, rng = own, self.rng  # a separate generator keeps worlds without extensions unchanged
+        lowest = [one for one in behaviors if one.level == max(each.level for each in behaviors)]
+        found = self.refining(own.choice(lowest), lowest[0].level, len(lowest))
+        self.rng = rng
         return found
 
     def priced(self, behaviors: list[Behavior]) -> list[Behavior]:

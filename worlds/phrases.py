@@ -8,6 +8,7 @@ from fractions import Fraction
 from random import Random
 
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, situations_in
+from confab.reasoner.language import substituted
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -22,15 +23,18 @@ from confab.reasoner.symbols import (
     RelationCondition,
     Rule,
     SituationType,
+    Symbol,
     ValueCondition,
     ValueEffect,
     Witness,
 )
 
-EACH, ANYONE = "?each", "?anyone"
-"""Variables of conditions that a scene writes as a class in place of an individual (`EACH`), or as an absence (`ANYONE`)."""
+EACH, ANYONE, SELF = "?each", "?anyone", "?self"
+"""Variables of conditions that a scene writes as a class in place of an individual (`EACH`), or as an absence (`ANYONE`), and of
+the conditions of a described class (`SELF`)."""
 
 
+STANDARD = ("A", "B", "A1")
 MOST_TERMS = 3
 """An effect without a fitting term may get a new parameter only if the behaviour has fewer terms than this number."""
 CONDITIONS = (
@@ -54,10 +58,26 @@ class Vocabulary:
         self.aggregates: dict[str, Aggregate] = {}
         self.remembers: dict[str, str] = {}
         self.objects: tuple[str, ...] = ()
+        self.axioms: dict[str, tuple[str, ...]] = {}
+        self.owners: dict[str, tuple[str, ...]] = {}
+        self.initial: dict[Symbol, str] = {}
+        self.partial = False
+        """Whether numbers of pairs are drawn, and conditions on individuals that lack the situation type."""
+        self.owning: tuple[str, ...] = ()
+        self.overlaps: list[str] = []
+        """Classes that share individuals with other classes; those in `owning` may have situation types."""
+        self.definitions: dict[str, str] = {}
+        self.described: dict[str, tuple[Condition, ...]] = {}
+        """The OWL expressions of defined classes, and the conditions on a member of a class that situations define."""
         self.repeated = False
         """Whether several effects of a behaviour may change one situation type."""
         self.crowd = 0
         """Number of additional individuals of each class; with such individuals, few effects concern a whole class."""
+
+    def kind(self, kind: str, among: Sequence[str] | None = None) -> str:
+        """Return a class; if classes overlap, sometimes another class."""
+        among = self.overlaps if among is None else among
+        return self.rng.choice(among) if among and self.rng.random() < 0.4 else kind
 
 
 HIGHEST = 9
@@ -80,7 +100,7 @@ class Phrases:
     def fresh(self, kind: str) -> str:
         """Return a new parameter or variable of a class."""
         term = f"?p{len(self.kinds)}"
-        self.kinds[term] = kind
+        self.kinds[term] = self.draft.kind(kind) if kind in STANDARD else kind
         return term
 
     def seen(self, quantity: bool = False, changeable: bool = False) -> list[SituationType]:
@@ -95,6 +115,8 @@ class Phrases:
     def term(self, bound: Sequence[str], kind: str) -> str | None:
         """Return a term for an argument of a class, usually a term of the class and sometimes a term of another class."""
         members = self.draft.classes[kind]
+        if self.draft.partial and bound and self.rng.random() < 0.1:
+            return self.rng.choice(bound)
         fitting = [t for t in bound if set(self.kinds_of(t)) & set(members)]
         if fitting and self.rng.random() < (0.98 if self.draft.crowd else 0.92):
             return self.rng.choice(fitting)
@@ -139,6 +161,18 @@ class Phrases:
         value = rng.choice(fitting) if fitting and rng.random() < 0.4 else rng.choice(values or [FALSE])
         return ValueCondition(one.name, terms, value, negated=rng.random() < 0.4)
 
+    def described(self, term: str, own: bool = True) -> Condition | None:
+        """Return the condition that a term is of a described class, with `own` of a class whose base is the term's class."""
+        found = [
+            conditions
+            for conditions in self.draft.described.values()
+            if all(self.draft.situations[name].level <= self.level for name in named(conditions))
+            and (not own or ClassCondition(SELF, self.kinds.get(term, "")) in conditions)
+        ]
+        if not found:
+            return None
+        return AnyOf((tuple(substituted(one, {SELF: term}) for one in self.rng.choice(found)),))
+
     def same(self, bound: Sequence[str]) -> Condition:
         """Return the trivial condition that a term equals itself."""
         one = self.rng.choice([*bound, *self.draft.objects])
@@ -149,6 +183,12 @@ class Phrases:
         rng, draft = self.rng, self.draft
         negated = rng.random() < 0.35
         kind = rng.choice(CONDITIONS)
+        if draft.partial and rng.random() < 0.3:
+            kind = "amount"
+        if "between" in draft.relations and rng.random() < 0.15:
+            terms = tuple(self.term(bound, of) for of in draft.ends["between"])
+            if None not in terms:
+                return RelationCondition("between", tuple(map(str, terms)), negated)
         if kind == "binding":
             functional = [s for s in self.seen() if not s.boolean]
             if functional and self.level != HIGHEST and depth:
@@ -157,12 +197,16 @@ class Phrases:
                 if None not in arguments:
                     bound.append(self.fresh(one.range))
                     return ValueCondition(one.name, tuple(map(str, arguments)), bound[-1])
+        if draft.described and bound and rng.random() < 0.2:
+            of_class = self.described(rng.choice(bound), rng.random() < 0.5)
+            if of_class is not None:
+                return contrary(of_class) if negated else of_class
         if kind == "near" and "near" in draft.relations:
             terms = tuple(self.term(bound, of) for of in draft.ends["near"])
             if None not in terms:
                 return RelationCondition("near", tuple(map(str, terms)), negated)
         if kind == "class" and bound:
-            return ClassCondition(rng.choice(bound), rng.choice(("A1", "A1", "B")), negated)
+            return ClassCondition(rng.choice(bound), draft.kind(rng.choice(("A1", "A1", "B"))), negated)
         if kind == "equal" and (bound or draft.objects):
             return EqualityCondition(
                 rng.choice([*bound, *draft.objects]), rng.choice([*bound, *draft.objects]), rng.random() < 0.6
@@ -171,7 +215,7 @@ class Phrases:
             return compared
         if kind == "witness" and depth:
             self.witnesses += 1
-            variable, of = f"?w{self.witnesses}_{len(self.kinds)}", rng.choice(("A", "B", "A1"))
+            variable, of = f"?w{self.witnesses}_{len(self.kinds)}", draft.kind(rng.choice(("A", "B", "A1")))
             self.inner[variable] = of
             inner = [self.value([*bound, variable], variable)]
             if rng.random() < 0.5:
@@ -183,7 +227,7 @@ class Phrases:
             found = [s for s in self.seen() if len(s.arguments) == 1]
             if found:
                 one = rng.choice(found)
-                of = rng.choice([one.arguments[0] if one.arguments[0] in draft.parents else "A", "A"])
+                of = draft.kind(rng.choice([one.arguments[0] if one.arguments[0] in draft.parents else "A", "A"]))
                 if one.boolean:
                     inside = ValueCondition(one.name, (ANYONE,), TRUE)
                 else:
@@ -194,7 +238,7 @@ class Phrases:
                     inside = ValueCondition(one.name, (ANYONE,), value)
                 return Witness(ANYONE, of, (inside,), rng.random() < 0.7)
         if kind == "every":
-            of = rng.choice(("A", "B", "A1"))
+            of = draft.kind(rng.choice(("A", "B", "A1")))
             self.inner[EACH] = of
             one_of = self.value([*bound, EACH], EACH)
             if isinstance(one_of, ValueCondition) and one_of.arguments.count(EACH) == 1 and one_of.value != EACH:
@@ -209,7 +253,7 @@ class Phrases:
     def comparison(self, bound: Sequence[str], negated: bool) -> Condition | None:
         """Return a random comparison of numbers, or None if the level has no numbers."""
         left = self.number(bound, 1)
-        if not isinstance(left, Amount | Calculation):
+        if not isinstance(left, Amount | Calculation) and not (self.draft.partial and isinstance(left, Measure)):
             return None
         right: Expression = Fraction(self.rng.randint(0, 3))
         if self.rng.random() < 0.3:
@@ -235,6 +279,9 @@ class Phrases:
         if "size" in self.draft.relations and rng.random() < 0.2:
             one = self.term(bound, "A")
             return None if one is None else Measure("size", (one,))
+        if "way" in self.draft.relations and rng.random() < 0.3:
+            ends = [self.term(bound, of) for of in self.draft.ends["way"]]
+            return None if None in ends else Measure("way", tuple(map(str, ends)))
         situation = rng.choice(seen)
         terms = [self.term(bound, of) for of in situation.arguments]
         return None if None in terms else Amount(situation.name, tuple(map(str, terms)))
@@ -266,12 +313,12 @@ class Phrases:
             return
         each, terms = None, list[str | None]()
         for kind in one.arguments:
-            if each is None and kind in ("A", "B", "A1") and rng.random() < (0.03 if draft.crowd else 0.25):
-                each = Parameter(EACH, rng.choice((kind, kind, "A1")))
+            if each is None and kind in draft.parents and rng.random() < (0.03 if draft.crowd else 0.25):
+                each = Parameter(EACH, draft.kind(rng.choice((kind, kind, "A1"))))
                 self.inner[EACH] = each.kind
                 terms.append(EACH)
             elif (
-                kind in ("A", "B", "A1") and len(self.kinds) < MOST_TERMS and rng.random() < (0.1 if draft.crowd else 0.7)
+                kind in draft.parents and len(self.kinds) < MOST_TERMS and rng.random() < (0.1 if draft.crowd else 0.7)
                 and not any(set(self.kinds_of(t)) & set(draft.classes[kind]) for t in bound)
             ):  # fmt: skip
                 bound.append(self.fresh(kind))
@@ -286,6 +333,13 @@ class Phrases:
             when = (self.value(inner, EACH if each else None),)
             if each and _mentions_twice(when[0]):
                 when = ()
+            if (
+                each
+                and draft.described
+                and rng.random() < 0.4
+                and (of_class := self.described(EACH, False)) is not None
+            ):
+                when = (of_class,)
         if one.quantity is not None:
             if not draft.repeated and any(change.situation == one.name for change in numbers):
                 return

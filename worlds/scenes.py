@@ -9,16 +9,19 @@ from random import Random
 
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, bounds, written
 from confab.reasoner.derivation import TASK
+from confab.reasoner.language import substituted
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
     Aggregate,
+    AmountEffect,
     AnyOf,
     Behavior,
     ClassCondition,
     Comparison,
     Condition,
     EqualityCondition,
+    Parameter,
     RelationCondition,
     Rule,
     SituationType,
@@ -31,7 +34,7 @@ from confab.reasoner.updates.writing import Situations, update
 from confab.reasoner.vocabulary import ARGUMENTS
 from worlds.constraining import stated
 from worlds.mixed import RandomWorld
-from worlds.phrases import ANYONE, EACH
+from worlds.phrases import ANYONE, EACH, SELF
 
 HEADER = """\
 @prefix :        <https://example.org/w#> .
@@ -44,6 +47,8 @@ HEADER = """\
 <https://example.org/w> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> ; c:symbolicOnly true ;
   dcterms:title "w"@en ; dcterms:description "w"@en .
 """
+TUPLES = frozenset({"way", "between"})
+"""Relations whose rows are individuals of the scene: a number of two individuals, and a relation of three individuals."""
 CONTRARY = {"<": ">=", "<=": ">", ">=": "<", ">": "<="}
 """The sign of the negation of a comparison."""
 
@@ -62,6 +67,15 @@ def _decimal(number: Fraction) -> str:
     return said if "." in said else f"{said}.0"
 
 
+def without(one: Behavior, other: Behavior) -> Behavior | None:
+    """Return what a behaviour adds to another behaviour that it extends, or None if it lacks a part of the other one."""
+    parts = ("parameters", "variables", "preconditions", "effects", "amounts")
+    mine, its = ([getattr(each, part) for part in parts] for each in (one, other))
+    if any(part[: len(less)] != less for part, less in zip(mine, its, strict=True)):
+        return None
+    return replace(one, **{name: part[len(less) :] for name, part, less in zip(parts, mine, its, strict=True)})
+
+
 class _Scene:
     """Writes one world as Turtle."""
 
@@ -69,6 +83,7 @@ class _Scene:
         self.world, self.problem = world, world.problem
         self.situations = world.problem.domain.situations
         self.nodes: list[str] = []
+        self.written: list[Behavior] = []  # behaviours written as updates
         self.terms: dict[str, str] = {}
         self.where, self.count = "", 0
         self.rng = Random(f"goals {world.seed}")
@@ -81,6 +96,8 @@ class _Scene:
         for relation, kind in (("near", "owl:ObjectProperty"), ("size", "owl:DatatypeProperty")):
             if relation in self.problem.relations:
                 yield self.node(relation, f"{kind}, owl:NamedIndividual, c:Relation")
+        for relation in sorted(TUPLES & self.problem.relations.keys()):
+            yield self.node(relation, "owl:NamedIndividual, c:Relation")
         for name, rules in self.problem.domain.rules.items():
             if self.situations[name].arguments == (TASK,) or self.situations[name].added:
                 continue
@@ -115,7 +132,12 @@ class _Scene:
             owned = [_iri(s) for s, owners in self.world.owners.items() if name in owners]
             said = [f"rdfs:subClassOf {', '.join([*above, *map(_iri, dict.fromkeys(parents))])}"]
             said += [f"c:hasSituationType {', '.join(owned)}"] if owned else []
+            said += [f"owl:equivalentClass {self.world.definitions[name]}"] if name in self.world.definitions else []
             yield self.node(name, "owl:Class, owl:NamedIndividual", *said)
+        for name in sorted(self.world.definitions.keys() - self.world.parents.keys()):
+            yield self.node(
+                name, "owl:Class, owl:NamedIndividual", f"owl:equivalentClass {self.world.definitions[name]}"
+            )
 
     def situation(self, one: SituationType) -> Iterator[str]:
         name, owners = one.name, self.world.owners[one.name]
@@ -163,26 +185,31 @@ class _Scene:
                 )
 
     def rule(self, name: str, rule: Rule) -> Iterator[str]:
+        parameters, conditions = self.by_class(rule.parameters, rule.conditions)
+        rule = replace(rule, parameters=parameters, conditions=conditions)
         self.begin(name, [p.name for p in (*rule.parameters, *rule.variables)])
-        conditions = [self.condition(one) for one in rule.conditions]
+        asked = [self.condition(one) for one in rule.conditions]
         head = self.said(rule.situation, [p.name for p in rule.parameters], TRUE)
-        said = [f"c:condition {', '.join(conditions)}"] if conditions else []
+        said = [f"c:condition {', '.join(asked)}"] if asked else []
         yield self.node(name, "owl:NamedIndividual, c:Rule", *head, *said)
         yield from self.declared(rule.behavior)
         yield from self.nodes
 
     def aggregate(self, one: Aggregate) -> Iterator[str]:
         name = f"{one.situation}.total"
+        terms, conditions = self.by_class((*one.parameters, *one.variables), one.conditions)
+        many = len(one.parameters)
+        one = replace(one, parameters=terms[:many], variables=terms[many:], conditions=conditions)
         self.begin(name, [p.name for p in (*one.parameters, *one.variables)])
         owners = [p.name for p in one.parameters]
         if "|" in one.parameters[0].kind and isinstance(one.conditions[0], EqualityCondition):
             owners = [one.conditions[0].right]  # the rule of a total of several classes names one individual
             one = replace(one, parameters=(), conditions=one.conditions[1:])
-        conditions = [self.condition(condition) for condition in one.conditions]
+        asked = [self.condition(condition) for condition in one.conditions]
         said = [f"c:situationType :{one.situation}", *self.arguments(owners)]
         said += [f'c:aggregate "{one.function}"', f"c:over {', '.join(self.terms[v.name] for v in one.variables)}"]
         said += [self.side("right", one.amount)] if one.function != "count" else []
-        said += [f"c:condition {', '.join(conditions)}"] if conditions else []
+        said += [f"c:condition {', '.join(asked)}"] if asked else []
         yield self.node(name, "owl:NamedIndividual, c:Rule", *said)
         yield from self.declared(one.behavior)
         yield from self.nodes
@@ -202,8 +229,16 @@ class _Scene:
     def behavior(self, index: int, one: Behavior) -> Iterator[str]:
         head = [f"c:level {one.level}", f"c:index {index}"]
         head += [f"c:cost {one.cost}"] if one.cost != 1 else []
+        parameters, conditions = self.by_class(one.parameters, one.preconditions)
+        one = replace(one, parameters=parameters, preconditions=conditions)
         if one.name in self.world.updates and one.price is None and (text := self.as_update(one)) is not None:
-            yield self.node(one.name, "owl:NamedIndividual, c:Behavior", *head, f'c:update """{text}"""')
+            said = [f'c:update """{text}"""']
+            for other in self.written if self.world.extending else ():
+                if (more := without(one, other)) is not None and (text := self.as_update(more)) is not None:
+                    said = [f"c:extends :{other.name}", f'c:update """{text}"""']
+                    break
+            self.written.append(one)
+            yield self.node(one.name, "owl:NamedIndividual, c:Behavior", *head, *said)
             return
         self.begin(one.name, [p.name for p in (*one.parameters, *one.variables)])
         head += [f"c:parameter {', '.join(self.terms[p.name] for p in one.parameters)}"] if one.parameters else []
@@ -213,7 +248,8 @@ class _Scene:
         effects = []
         for effect in one.every_effect:
             if effect.each is not None:
-                self.terms[EACH] = f":{effect.each.kind}"
+                (each,), conditions = self.by_class((effect.each,), effect.when)
+                effect, self.terms[EACH] = replace(effect, when=conditions), f":{each.kind}"
             when = [self.condition(condition) for condition in effect.when]
             tail = [f"c:when {', '.join(when)}"] if when else []
             if isinstance(effect, ValueEffect):
@@ -230,6 +266,12 @@ class _Scene:
 
     def as_update(self, one: Behavior) -> str | None:
         """Return a behaviour as a SPARQL update, or None if an update can't express the behaviour."""
+        every = [replace(effect, when=tuple(map(self.with_classes, effect.when))) for effect in one.every_effect]
+        one = replace(
+            one, preconditions=tuple(map(self.with_classes, one.preconditions)),
+            effects=tuple(effect for effect in every if isinstance(effect, ValueEffect)),
+            amounts=tuple(effect for effect in every if isinstance(effect, AmountEffect)),
+        )  # fmt: skip
         properties = {
             name: name.lower()
             for name, its in self.situations.items()
@@ -241,6 +283,41 @@ class _Scene:
             return None
 
     # -------------------------------------------------------------------------------------------------------- conditions
+
+    def class_of(self, one: Condition) -> tuple[str, str, str] | None:
+        """Return the term of a condition that a described class expresses, with the class and its base, or None."""
+        if isinstance(one, AnyOf) and len(one.alternatives) == 1 and isinstance(one.alternatives[0][0], ClassCondition):
+            of = one.alternatives[0][0]
+            for name, conditions in self.world.described.items():
+                if one.alternatives[0] == tuple(substituted(each, {SELF: of.term}) for each in conditions):
+                    return of.term, name, of.kind
+        return None
+
+    def with_classes(self, one: Condition) -> Condition:
+        """Return a condition with described classes in place of their conditions."""
+        match one:
+            case AnyOf(alternatives):
+                if (said := self.class_of(one)) is not None:
+                    return ClassCondition(said[0], said[1], one.negated)
+                return replace(one, alternatives=tuple(tuple(map(self.with_classes, group)) for group in alternatives))
+            case Witness():
+                return replace(one, conditions=tuple(map(self.with_classes, one.conditions)))
+            case _:
+                return one
+
+    def by_class(
+        self, parameters: tuple[Parameter, ...], conditions: tuple[Condition, ...]
+    ) -> tuple[tuple[Parameter, ...], tuple[Condition, ...]]:
+        """Return parameters and conditions; described classes become the classes of parameters."""
+        found = {one.name: one for one in parameters}
+        left = []
+        for one in conditions:
+            said = None if one.negated else self.class_of(one)
+            if said is not None and said[0] in found and found[said[0]].kind == said[2]:
+                found[said[0]] = Parameter(said[0], said[1])
+            else:
+                left.append(one)
+        return tuple(found.values()), tuple(left)
 
     def put(self, term: str) -> str:
         return self.terms.get(term) or _iri(term)
@@ -291,8 +368,10 @@ class _Scene:
             case ValueCondition(situation, arguments, value):
                 return self.part("ValueCondition", *self.said(situation, arguments, value), *no)
             case RelationCondition(relation, arguments):
-                subject, target = arguments
-                said = [f"c:relation :{relation}", f"c:about {self.put(subject)}", f"c:value {self.put(target)}"]
+                subject, *others = arguments
+                said = [f"c:relation :{relation}", *self.arguments(arguments)]
+                if relation not in TUPLES:
+                    said = [f"c:relation :{relation}", f"c:about {self.put(subject)}", f"c:value {self.put(others[0])}"]
                 return self.part("RelationCondition", *said, *no)
             case ClassCondition(term, kind):
                 return self.part("ClassCondition", f"c:about {self.put(term)}", f"c:ofClass :{kind}", *no)
@@ -301,6 +380,8 @@ class _Scene:
             case Comparison(left, sign, right):
                 said = [f'c:sign "{sign}"', self.side("left", left), self.side("right", right)]
                 return self.part("Comparison", *said, *no)
+            case AnyOf() if (of_class := self.class_of(one)) is not None:
+                return self.part("ClassCondition", f"c:about {self.put(of_class[0])}", f"c:ofClass :{of_class[1]}", *no)
             case AnyOf(alternatives):
                 groups = [self.group(group) for group in alternatives]
                 return self.part("AnyOf", f"c:alternative {', '.join(groups)}", *no)
@@ -317,11 +398,12 @@ class _Scene:
                     self.terms[EACH] = before
                 return found
             case Witness(variable, kind, conditions):
+                (sought_of,), conditions = self.by_class((Parameter(variable, kind),), conditions)
                 self.count += 1
                 before = self.terms.get(variable)
                 self.terms[variable] = f":{self.where}.w{self.count:03}"
                 self.nodes.append(
-                    f"{self.terms[variable]} a owl:NamedIndividual, c:Variable ; c:termType {_iri(kind)} ."
+                    f"{self.terms[variable]} a owl:NamedIndividual, c:Variable ; c:termType {_iri(sought_of.kind)} ."
                 )
                 inside = [self.condition(each) for each in conditions]
                 sought = f"c:witness {self.terms[variable]}"
@@ -354,9 +436,11 @@ class _Scene:
 
     def individuals(self) -> Iterator[str]:
         classes = self.problem.classes
-        everyone = [*classes["A"], *classes["B"]]
+        everyone = list(dict.fromkeys([*classes["A"], *classes["B"]]))
+        parents = {kind: its for kind, its in self.world.parents.items() if kind not in self.world.definitions}
         for index, name in enumerate(everyone, start=1):
-            kind = "A1" if name in classes["A1"] else "A" if name in classes["A"] else "B"
+            own = [kind for kind in parents if name in classes[kind]]
+            kinds = [f":{kind}" for kind in own if not any(kind in parents[other] for other in own)]
             said = [f"c:index {index}"]
             for symbol, value in self.problem.initial.items():
                 situation = self.situations[symbol.situation]
@@ -370,7 +454,7 @@ class _Scene:
                 f":near {_iri(row[1])}" for row in sorted(self.problem.relations.get("near", ())) if row[0] == name
             ]
             said += [f":size {row[1]}.0" for row in sorted(self.problem.relations.get("size", ())) if row[0] == name]
-            yield self.node(name, f"owl:NamedIndividual, :{kind}", *said)
+            yield self.node(name, f"owl:NamedIndividual, {', '.join(kinds)}", *said)
         own = [v for name in self.situations for v in classes.get(name, ()) if v.startswith(name)]
         if len(everyone) + len(own) > 1:
             yield f"[ a owl:AllDifferent ; owl:distinctMembers ( {' '.join(sorted(map(_iri, [*everyone, *own])))} ) ] ."
@@ -378,6 +462,11 @@ class _Scene:
     def facts(self) -> Iterator[str]:
         """Yield the initial facts that can't be written as properties of individuals."""
         number = 0
+        for relation, row in ((r, row) for r in sorted(TUPLES) for row in sorted(self.problem.relations.get(r, ()))):
+            number += 1
+            said = [f"c:relation :{relation}", *self.arguments(row[:-1] if relation == "way" else row)]
+            said += [f"c:amount {row[-1]}.0"] if relation == "way" else []
+            yield self.node(f"fact{number}", "owl:NamedIndividual, c:SituatedObjectInstance", *said)
         for symbol, value in self.problem.initial.items():
             situation = self.situations[symbol.situation]
             if self.world.owners[symbol.situation] and (not situation.boolean or symbol.situation in self.world.pairs):

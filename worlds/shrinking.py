@@ -54,7 +54,7 @@ def smaller_worlds(world: RandomWorld) -> Iterator[RandomWorld]:
     for name in domain.situations:
         if not _mentioned(name, world):
             yield _without_situation(world, name)
-    for individual in (*problem.classes["A"], *problem.classes["B"]):
+    for individual in dict.fromkeys((*problem.classes["A"], *problem.classes["B"])):
         if (found := without_individual(world, individual)) is not None:
             yield found
     for relation in problem.relations:

@@ -218,7 +218,7 @@ def least_costs(soft: Interpreter, most: int) -> dict[frozenset[Symbol], Fractio
     Raises
     ------
     TooManyStatesError
-        More than `most` nodes are reachable, divided by the number of sets of symbols that choices release.
+        More than `most` nodes are reachable.
     """
     problem, weights = soft.problem, soft.problem.weights
     level = max(problem.domain.levels, default=0)
@@ -233,7 +233,7 @@ def least_costs(soft: Interpreter, most: int) -> dict[frozenset[Symbol], Fractio
         free = meant.wanting({})
         free.rests = {slot: rest for slot, rest in meant.wanting({}).rests.items() if slot in slots}
         best: dict[frozenset[Symbol], Any] = {}
-        for (state, restless), cost in free.explored(level, most // len(groups)).costs.items():
+        for (state, restless), cost in free.explored(level, most).costs.items():
             if not restless and all(meant.meets(state, symbol, value) for symbol, value in hard.items()):
                 met = frozenset(symbol for symbol in weights if meant.meets(state, symbol, problem.goal[symbol]))
                 best[met] = min(cost, best.get(met, cost))
