@@ -80,13 +80,12 @@ class Greedy:
             return
         self.counts.expanded += 1
         self.work += evaluation.work
-        possible = set(evaluation.applicable)
-        preferred = [operator for operator in dict.fromkeys(evaluation.plan) if operator in possible]
-        operators = array("q", (*preferred, *sorted(possible.difference(preferred))))
+        ranked, preferred = evaluation.ranked()
+        operators = array("q", ranked)
         self.bytes += operators.itemsize * len(operators)
         self.open.push(evaluation.h, (state, iter(operators)), ALL)
         if preferred:
-            self.open.push(evaluation.h, (state, iter(operators[: len(preferred)])), PREFERRED)
+            self.open.push(evaluation.h, (state, iter(operators[:preferred])), PREFERRED)
         if self.least is None or evaluation.h < self.least:
             self.least = evaluation.h
             self.open.turns[PREFERRED] -= BOOST

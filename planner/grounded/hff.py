@@ -39,6 +39,12 @@ class Evaluation(NamedTuple):
     applicable: list[int]
     work: int
 
+    def ranked(self) -> tuple[list[int], int]:
+        """Return the applicable operators, those of the relaxed plan first, and the number of these."""
+        possible = set(self.applicable)
+        preferred = [operator for operator in dict.fromkeys(self.plan) if operator in possible]
+        return [*preferred, *sorted(possible.difference(preferred))], len(preferred)
+
 
 Evaluate: TypeAlias = "Callable[[int], Evaluation | None]"
 """Function of a state that returns the evaluation, or None if the goal is unreachable from the state."""

@@ -94,14 +94,12 @@ def _unmet_subgoals(
 
 def waits_for(space: Workspace, level: int, cell: Cell, value: str) -> list[Cell]:
     """Return the symbols whose change could make a value reachable in one step."""
-    found: dict[Cell, None] = {}
+    blocked: list[tuple[Achiever, tuple[int, ...], Env]] = []
     space.subgoals.concern(frozenset((*arguments_of(cell[1]), value)))
     if cell[0] in space.program.rules:
         return [subgoal[:2] for subgoal in space.subgoals.defining(*cell, value == TRUE, level)]
     for achiever in space.program.achievers.get((level, cell[0]), ()):
         for _, unmet, env in space.achieving[achiever.behavior, achiever.effect](*arguments_of(cell[1]), value):
             space.look()
-            for number in unmet:
-                for situation, key, _ in space.subgoals.towards(achiever, number, env, level):
-                    found[situation, key] = None
-    return list(found)
+            blocked.append((achiever, unmet, env))
+    return list(dict.fromkeys(subgoal[:2] for subgoal in _unmet_subgoals(space, level, blocked)))

@@ -24,7 +24,7 @@ from typing import TypeAlias
 
 from confab.planner.grounded.best_first import search
 from confab.planner.grounded.grounding import ground
-from confab.planner.grounded.hff import Evaluation, heuristic
+from confab.planner.grounded.hff import heuristic
 from confab.planner.grounded.task import Task
 from confab.planner.plan import OUT_OF_MEMORY, Counts, Limits, Outcome, Plan, Reason, Status, Step, UngroundableError
 from confab.planner.timed.activities import EventKind, StepEvent
@@ -374,7 +374,7 @@ class _Finder:
         key = self.key(root)
         came_from[key] = None
         number = 0
-        queue: list[tuple[int, int, int, _SearchNode, list[int]]] = [(began.h, 0, 0, root, self.ranked(began))]
+        queue: list[tuple[int, int, int, _SearchNode, list[int]]] = [(began.h, 0, 0, root, began.ranked()[0])]
         while queue:
             check("searching for concurrent steps", 0.0)
             if self.deadline is not None and perf_counter() > self.deadline:
@@ -398,7 +398,7 @@ class _Finder:
                 self.counts.expanded += 1
                 number += 1
                 rank = found.h + len(after.running)
-                heapq.heappush(queue, (rank, 0, -number, after, self.ranked(found)))
+                heapq.heappush(queue, (rank, 0, -number, after, found.ranked()[0]))
                 if rank < h:
                     rest = operators[position + 1 :]
                     if rest:
@@ -415,12 +415,6 @@ class _Finder:
         end = next(operator for operator, its in node.running.items() if its == step)
         times = self.times(node, {end: step})
         return 0 if times is None else times[-1]
-
-    def ranked(self, evaluation: Evaluation) -> list[int]:
-        """Return the applicable operators of a state, the preferred operators first."""
-        possible = set(evaluation.applicable)
-        preferred = [operator for operator in dict.fromkeys(evaluation.plan) if operator in possible]
-        return [*preferred, *sorted(possible.difference(preferred))]
 
     def after(self, node: _SearchNode, operator: int) -> _SearchNode | None:
         """Return the node after an operator, or None if the node isn't allowed.
