@@ -62,7 +62,6 @@ class Agenda:
     _asleep: dict[Cell, None] = field(default_factory=dict)
     _woken_by: dict[Cell, list[Cell]] = field(default_factory=dict)
     _before: Mapping[Cell, Sequence[Cell]] = field(default_factory=dict)
-    _tried: dict[int, int] = field(default_factory=dict)
     _restarted: bool = False
     proofs: Proofs = field(init=False)
 
@@ -268,18 +267,10 @@ class Agenda:
         return False
 
     def all_goals(self, level: int) -> bool:
-        """Achieve all goals together on a level from the current state; return whether that succeeded.
-
-        The agenda makes at most one attempt for each number of applied steps.
-        """
+        """Achieve all goals together on a level from the current state; return whether that succeeded."""
         call = self.call
-        if (
-            not self.allowed(level)
-            or call.program.size(level) > MOST_OPERATORS
-            or self._tried.get(level) == len(call.steps)
-        ):
+        if not self.allowed(level) or call.program.size(level) > MOST_OPERATORS:
             return False
-        self._tried[level] = len(call.steps)
         open_ = {c: v for c, v in call.goal.items() if not call.met(c) and call.space.visible(level, c)}
         if not open_ or call.achieve_goals(level, open_, PART):
             return bool(open_)
