@@ -24,7 +24,7 @@ from types import FrameType
 from typing import Any, TypeVar
 
 from confab.plan_options import NO_ENGINE
-from confab.planner.acting.episode import End
+from confab.planner.acting.episode import End, Episode
 from confab.planner.certificates import Certificate
 from confab.planner.plan import Outcome, Plan, Reason, Status, UnsolvableError
 from confab.planner.validation import LoggedState, successor, validate
@@ -402,6 +402,8 @@ class Judge:
                 self.soft_outcome(mode, result.outcome, soft, costs)
         if self.sampled(EXPORTS, "export", "soft"):
             self.soft_export(read, soft)
+        if self.sampled(EXECUTIONS, "execute", "soft"):
+            self.soft_execution(read, soft)
 
     def soft_outcome(
         self, mode: str, outcome: Outcome, soft: Interpreter, costs: Mapping[frozenset[Symbol], Fraction]
@@ -779,36 +781,60 @@ class Judge:
         run = self.call(mode, lambda: read.execute(interventions=texts, time_limit=SECONDS))
         if run is None:
             return
-        episode = run.episode
-        self.found.status[mode] = episode.status.value
-        state = list(self.meant.initial)
-        events: list[tuple[float, int, Any]] = [(one.end, 0, one.step) for one in episode.events if one.ok]
-        events += [(at, 1, one) for one, at in episode.interventions]
-        for _, kind, one in sorted(events, key=lambda event: event[:2]):
-            if kind:
-                for fact in one.facts:
-                    if fact.symbol in self.meant.slots:
-                        slot = self.meant.slots[fact.symbol]
-                        amount = self.meant.kinds[fact.symbol.situation].quantity
-                        state[slot] = fact.value if amount is None else type(state[slot])(fact.value)
-                state = list(self.meant.closed(state))
-                continue
-            made = list(self.meant.done(one.behavior, one.arguments, tuple(state)))
-            if not made:
-                self.complain("a step that can't be done is done", mode, f"{one}; {texts}")
-                return
-            state = list(made[0][1])
-        reached = self.meant.wanted(tuple(state))
+        state = self.replayed(mode, run.episode, self.meant, texts)
+        if state is None:
+            return
+        episode, reached = run.episode, self.meant.wanted(state)
         if (episode.status is End.REACHED) and not reached:
             self.complain("said to be reached, and isn't", mode, texts)
         if episode.status is End.IMPOSSIBLE:
-            initial, self.meant.initial = self.meant.initial, tuple(state)
+            initial, self.meant.initial = self.meant.initial, state
             with suppress(TooManyStatesError):
                 if self.meant.explored(self.world.problem.domain.levels[-1], MOST).least is not None:
                     self.complain("said to be impossible, and isn't", mode, texts)
             self.meant.initial = initial
         if episode.status is End.GAVE_UP:
             self.found.remarks.append(Complaint("gave-up", mode, "; ".join(r.text for r in episode.reasons)))
+
+    def soft_execution(self, read: Scene, soft: Interpreter) -> None:
+        """Execute a task with soft goals, sometimes with a fact that changes, and compare which goals hold in the end."""
+        mode, fact, goal = "soft execute", self.fact(), soft.problem.goal
+        texts = [f"after={self.rng.choice((1, 1, 2))} {fact}"] if fact and self.rng.random() < 0.5 else []
+        run = self.call(mode, lambda: read.execute(interventions=texts, time_limit=SECONDS))
+        state = None if run is None else self.replayed(mode, run.episode, soft, texts)
+        if run is None or state is None:
+            return
+        hard = {symbol: value for symbol, value in goal.items() if symbol not in soft.problem.weights}
+        dropped = {one.symbol for one, _ in run.episode.interventions}
+        if run.episode.status is End.REACHED and not all(
+            soft.meets(state, symbol, value) for symbol, value in hard.items() if symbol not in dropped
+        ):
+            self.complain("said to be reached, and isn't", mode, texts)
+        for one in run.soft_goals:
+            if one.fact.symbol in soft.slots and soft.meets(state, one.fact.symbol, one.fact.value) is not one.met:
+                self.complain("a soft goal is said to be met, and isn't, or the reverse", mode, f"{one}; {texts}")
+
+    def replayed(self, mode: str, episode: Episode, meant: Interpreter, texts: Sequence[str]) -> State | None:
+        """Return the final state of an execution; record a fault if a step can't be executed."""
+        self.found.status[mode] = episode.status.value
+        state = list(meant.initial)
+        events: list[tuple[float, int, Any]] = [(one.end, 0, one.step) for one in episode.events if one.ok]
+        events += [(at, 1, one) for one, at in episode.interventions]
+        for _, kind, one in sorted(events, key=lambda event: event[:2]):
+            if kind:
+                for fact in one.facts:
+                    if fact.symbol in meant.slots:
+                        slot = meant.slots[fact.symbol]
+                        amount = meant.kinds[fact.symbol.situation].quantity
+                        state[slot] = fact.value if amount is None else type(state[slot])(fact.value)
+                state = list(meant.closed(state))
+                continue
+            made = list(meant.done(one.behavior, one.arguments, tuple(state)))
+            if not made:
+                self.complain("a step that can't be done is done", mode, f"{one}; {texts}")
+                return None
+            state = list(made[0][1])
+        return tuple(state)
 
     def alone(self, situation: str) -> bool:
         """Return whether a situation type shares no values with other situation types.
