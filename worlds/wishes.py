@@ -1,4 +1,4 @@
-"""Soft goals of random worlds that aren't among their goals, and the least total of cost and unmet weights.
+"""Wishes of random worlds: further goals, most of them soft, and the least total of cost and unmet weights.
 
 A wish may be about a symbol that a goal or another wish is about, about all individuals of a class, about derived situations, or a
 goal with alternatives or with some individual. Each fact of a wish about a class counts by itself.
@@ -51,16 +51,16 @@ KINDS = (
     "some",
     "some",
 )
-MOST = 8
-"""Maximum number of soft goals of a world."""
+MOST, HARD = 8, 0.2
+"""Maximum number of facts of the wishes of a world, and share of wishes that are hard goals."""
 
 
 @dataclass(frozen=True)
 class Wish:
-    """A soft goal: its condition as it is written, and its weight."""
+    """A goal: its condition as it is written, and its weight if it is soft."""
 
     condition: Condition
-    weight: Fraction
+    weight: Fraction | None
 
     def facts(self, problem: Problem) -> list[Condition]:
         """Return the conditions that count by themselves: one for each individual of a class."""
@@ -76,13 +76,14 @@ class Wish:
 
 
 def wishes(seed: int, meant: Interpreter, states: Sequence[State], share: float) -> tuple[Wish, ...]:
-    """Return the wishes of a share of the worlds, which mostly hold in some of the given states."""
+    """Return the wishes of a share of the worlds; most of them hold in some of the given states."""
     rng = Random(f"wishes {seed}")
     if rng.random() >= share:
         return ()
     draft, found = _Wishes(rng, meant, states), list[Wish]()
     for _ in range(rng.choice((1, 2, 2, 3))):
-        found += [Wish(one, Fraction(rng.choice(WEIGHTS))) for one in draft.conditions(rng.choice(KINDS))]
+        weight = None if rng.random() < HARD else Fraction(rng.choice(WEIGHTS))
+        found += [Wish(one, weight) for one in draft.conditions(rng.choice(KINDS))]
     while sum(len(one.facts(meant.problem)) for one in found) > MOST:
         found.pop()
     return tuple(found)
@@ -187,7 +188,7 @@ def softened(problem: Problem, wished: Sequence[Wish], weights: Mapping[Symbol, 
         for member, condition in enumerate(facts):
             name = f"wish{number}" if condition is wish.condition else f"wish{number}.{member}"
             problem = with_goal(problem, name, condition)
-            found[Symbol(name, ("task",))] = wish.weight
+            found |= {} if wish.weight is None else {Symbol(name, ("task",)): wish.weight}
     return replace(problem, weights=found)
 
 

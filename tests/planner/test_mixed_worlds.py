@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -10,6 +11,7 @@ import pytest
 
 from confab.planner.plan import Plan, Status, Step
 from confab.planner.validation import BehaviorReader
+from confab.planning import plan
 from confab.reasoner.aggregates.dependencies import read_by
 from confab.reasoner.derivation import strata
 from confab.reasoner.graph.knowledge import KnowledgeError
@@ -121,6 +123,23 @@ def test_worlds_with_wishes_or_with_several_constraints_give_no_wrong_answer(
         planned += "soft" in its.status if world.wishes else len(world.problem.domain.constraints) > 1
     assert not wrong
     assert planned > 1
+
+
+@pytest.mark.usefixtures("unlimited_judge")
+def test_a_wrong_penalty_and_a_wrong_bound_of_soft_goals_are_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def planned(*args: Any, **options: Any) -> Any:
+        result = plan(*args, **options)
+        penalty = None if result.outcome.penalty is None else result.outcome.penalty + 1
+        return replace(result, outcome=replace(result.outcome, penalty=penalty, bound=1000.0))
+
+    monkeypatch.setattr(judging, "plan", planned)
+    found = set[str]()
+    for seed in range(1_300_001_010, 1_300_001_013):
+        world, meant = drawn(seed, wished=1.0)
+        found |= {one.kind for one in Judge(world, tmp_path, meant=meant, only="soft").judged().complaints}
+    assert found >= {"wrong penalty", "wrong bound"}
 
 
 @pytest.mark.usefixtures("unlimited_judge")
