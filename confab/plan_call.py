@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
@@ -196,6 +197,8 @@ def planned(task: PlanningTask) -> Found:
     problem, timed = task.with_measured_durations(problem), schedule_of(outcome)
     if timed is None and asks_for_times(problem, task.options.minimise):
         outcome, timed = in_time(task, problem, outcome)
+    if timed is not None and task.problem.weights:  # a plan that leaves more soft goals unmet may be shorter
+        timed = replace(timed, least=Fraction(0))
     return Found(problem, outcome, timed, part, task.options.strategy == "optimal")
 
 

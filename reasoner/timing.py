@@ -8,7 +8,7 @@ condition must hold and when each effect takes place.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from itertools import product
@@ -171,11 +171,17 @@ def only_during(problem: Problem) -> frozenset[str]:
     found = set[str]()
     for behavior in problem.domain.behaviors.values():
         for effect in _passing(behavior):
+            kinds = {**behavior.kinds, **({effect.each.name: effect.each.kind} if effect.each else {})}
             if any(
-                _asks(problem, other, effect)
+                _asks(problem, other, effect, kinds)
                 for other in problem.domain.behaviors.values()
                 if other.name != behavior.name and other.level == behavior.level
-            ) or any(s.situation == effect.situation and v == effect.value for s, v in problem.goal.items()):
+            ) or any(
+                s.situation == effect.situation
+                and v == effect.value
+                and _may_agree(problem, (effect.arguments, kinds), (s.arguments, {}))
+                for s, v in problem.goal.items()
+            ):
                 found.add(behavior.name)
     return frozenset(found)
 
@@ -272,15 +278,33 @@ def _passing(behavior: Behavior) -> tuple[ValueEffect, ...]:
     )
 
 
-def _asks(problem: Problem, behavior: Behavior, effect: ValueEffect) -> bool:
-    """Return whether the value of an effect may satisfy a condition of a behaviour."""
-    whens = [c for _, made in timing_of(behavior).effects for c in made.when]
+def _may_agree(problem: Problem, *lists: tuple[Sequence[str], Mapping[str, str]]) -> bool:
+    """Return whether two lists of terms may denote the same individuals; each list has the classes of its variables."""
+
+    def individuals(term: str, kinds: Mapping[str, str]) -> Collection[str]:
+        return problem.members(kinds[term]) if term in kinds else problem.individuals if term[0] == "?" else {term}
+
+    possible = ([individuals(term, kinds) for term in terms] for terms, kinds in lists)
+    return not any(set(ours).isdisjoint(theirs) for ours, theirs in zip(*possible, strict=True))
+
+
+def _asks(problem: Problem, behavior: Behavior, effect: ValueEffect, its: Mapping[str, str]) -> bool:
+    """Return whether the value of an effect may satisfy a condition of a behaviour.
+
+    `its` maps the variables of the effect to their classes.
+
+    Effects that count the violations of a constraint are left out, because no step needs a violation.
+    """
+    made = (one for _, one in timing_of(behavior).effects if one.situation not in problem.domain.constraints)
+    whens = [c for one in made for c in one.when]
     asked = [c for _, condition in timing_of(behavior).conditions for c in walk(condition)]
     kinds = dict(behavior.kinds)
     for one in (*asked, *(c for when in whens for c in walk(when))):
         if isinstance(one, Witness):
             kinds[one.variable] = one.kind
         if not isinstance(one, ValueCondition) or one.situation != effect.situation:
+            continue
+        if not _may_agree(problem, (effect.arguments, its), (one.arguments, kinds)):
             continue
         both = {one.value, effect.value}
         if any(value.startswith("?") for value in both):

@@ -10,6 +10,7 @@ to be a valid plan in sequence, with the same effects.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -110,16 +111,20 @@ Effects = tuple[tuple[Cell, str], ...]
 
 
 def _in_sequence(problem: Problem, steps: Sequence[Step]) -> tuple[list[Effects], dict[Cell, int]]:
-    """Return the changes of each step of a sequence, and the last step that changes each symbol."""
+    """Return the changes of each step of a sequence, and the last step that changes each symbol.
+
+    Derived amounts are left out, because they follow from the other changes.
+    """
     rules, facts = BehaviorReader(problem), LoggedState(problem, problem.initial)
-    found, last = list[Effects](), dict[Cell, int]()
+    found, last, derived = list[Effects](), dict[Cell, int](), problem.domain.aggregates.keys()
     for number, step in enumerate(steps):
         changes = rules.changes(problem.domain.behaviors[step.behavior], step.arguments, facts) or []
         net = {(situation, key): value for situation, key, value in changes}
         for cell, value in net.items():
             facts.put(*cell, value)
-            last[cell] = number
-        found.append(tuple(sorted(net.items())))
+            if cell[0] not in derived:
+                last[cell] = number
+        found.append(tuple(sorted((cell, value) for cell, value in net.items() if cell[0] not in derived)))
     return found, last
 
 
@@ -153,6 +158,7 @@ class _TimedExecution:
     def run(self) -> Iterator[Fault]:
         """Yield the faults, until a step is inapplicable."""
         yield from self.actors()
+        yield from self.happenings()
         slots = self.timed.slots
         # At the same instant, ends come before begins. Steps without duration begin and end at once, in the plan's order.
         events = sorted(
@@ -202,6 +208,20 @@ class _TimedExecution:
                 if busy is not None and slot.begin < busy.end:
                     yield Fault(slot.step.path, f"{slot.step}: {actor} is in {busy.step} until {busy.end} s")
                 busy = slot if busy is None or slot.end >= busy.end else busy
+
+    def happenings(self) -> Iterator[Fault]:
+        """Yield the external events that the plan repeats, or that it omits although it lasts until their times."""
+        its, end = defaultdict[str, list[Step]](list), Fraction(0)
+        for slot in self.timed.slots:
+            if slot.step.behavior in self.times.events:
+                its[slot.step.behavior].append(slot.step)
+            else:
+                end = max(end, slot.end)
+        for name, at in self.times.events.items():
+            for again in its[name][1:]:
+                yield Fault(again.path, f"{again}: it happens only once, at {at} s")
+            if not its[name] and at <= end:
+                yield Fault((), f"{name} happens at {at} s, before the plan ends, and isn't in the plan")
 
     def begun(self, number: int, slot: Slot, time: Fraction) -> Iterator[Fault]:
         """Begin a step; yield its faults."""
@@ -260,7 +280,8 @@ class _TimedExecution:
     def put(self, one: _Running, cell: Cell, value: str, time: Fraction) -> None:
         """Set the value of a symbol, and record the step and the time."""
         self.facts.put(*cell, value)
-        self.made[one.number][cell] = value
+        if cell[0] not in self.problem.domain.aggregates:
+            self.made[one.number][cell] = value
         self.last[cell] = one.number
         self.since[cell] = time
 

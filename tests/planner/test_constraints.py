@@ -167,3 +167,9 @@ def test_a_schedule_keeps_a_constraint_at_every_time_and_without_it_overlaps(tmp
         assert timed is not None
         times.append(timed.makespan)
     assert times == [120, 60]
+
+
+def test_a_bounded_count_that_a_step_raises_and_lowers_again_is_kept_on_two_levels() -> None:
+    timed = confab.load(Path(__file__).parent / "cases" / "ovens-in-levels.ttl").plan(minimise="makespan").timed
+    assert timed is not None
+    assert timed.makespan == 120

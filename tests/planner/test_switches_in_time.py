@@ -1,0 +1,140 @@
+"""Tasks about switches in time: external events, soft goals with a makespan, and values that a step gives only for a while."""
+
+from pathlib import Path
+
+import pytest
+
+import confab
+from confab.planner.plan import Status
+from confab.timing import headline
+
+HEAD = """
+@prefix : <https://example.org/switches#> .
+@prefix c: <https://w3id.org/confab/core#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+@prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
+<https://example.org/switches> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> ; c:symbolicOnly true .
+:Switch a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object ; c:hasSituationType :ON .
+:Worker a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object .
+:Tank a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object ; c:hasSituationType :LEVEL .
+:ON a owl:Class, owl:NamedIndividual, c:SituationType .
+:LEVEL a owl:NamedIndividual, c:SituationType, c:Amount ; c:valueProperty :level .
+:level a owl:DatatypeProperty, owl:FunctionalProperty, owl:NamedIndividual ; rdfs:domain :Tank ; rdfs:range xsd:decimal .
+:a a owl:NamedIndividual, :Switch . :a2 a owl:NamedIndividual, :Switch .
+:b a owl:NamedIndividual, :Switch . :b2 a owl:NamedIndividual, :Switch .
+:u a owl:NamedIndividual, :Worker . :v a owl:NamedIndividual, :Worker . :tank a owl:NamedIndividual, :Tank ; :level 0 .
+[] a owl:AllDifferent ; owl:distinctMembers ( :a :a2 :b :b2 :u :v :tank ) .
+:a.on a owl:NamedIndividual, c:SituatedObjectInstance ; c:about :a ; c:situationType :ON .
+"""
+
+
+def node(name: str, kind: str, about: str = "", more: str = "") -> str:
+    said = f" ; c:about :{about} ; c:situationType :ON" if about else ""
+    return f":{name} a owl:NamedIndividual, c:{kind}{said}{more} .\n"
+
+
+def lasts(seconds: int, prop: str = "duration") -> str:
+    return f' ; c:{prop} "PT{seconds}S"^^xsd:dayTimeDuration'
+
+
+def load(folder: Path, *parts: str) -> confab.Scene:
+    (folder / "switches.ttl").write_text(HEAD + "".join(parts), "utf-8")
+    return confab.load(folder / "switches.ttl")
+
+
+FIRST = " ; c:level 1 ; c:index 1"
+WORK = (
+    node("WORK", "Behavior", "", f"{FIRST} ; c:actor :u ; c:precondition :needs ; c:postcondition :works{lasts(10)}")
+    + node("needs", "ValueCondition", "a")
+    + node("works", "ValueEffect", "b")
+)
+"""A step of 10 s that turns b on; a must be on throughout."""
+DONE = node("task", "Task", "", " ; c:goal :done") + node("done", "ValueCondition", "b")
+
+
+@pytest.mark.parametrize(("seconds", "status"), [(5, Status.GAVE_UP), (10, Status.GAVE_UP), (12, Status.SOLVED)])
+def test_an_external_event_happens_although_no_goal_needs_it(seconds: int, status: Status, tmp_path: Path) -> None:
+    shut = node("SHUT", "Behavior", "", f"{FIRST} ; c:postcondition :off{lasts(0)}{lasts(seconds, 'happensAt')}")
+    off = node("off", "ValueEffect", "a", " ; c:negated true")
+    outcome = load(tmp_path, WORK, shut.replace("index 1", "index 2"), off, DONE).plan(minimise="makespan").outcome
+    assert outcome.status is status
+    assert (f"SHUT happens at {seconds} s" in str(outcome.reason)) is (status is Status.GAVE_UP)
+
+
+@pytest.mark.parametrize("proved", [False, True])
+@pytest.mark.parametrize(("wanted", "status"), [(1, Status.SOLVED), (2, Status.GAVE_UP)])
+def test_an_external_event_happens_only_once(wanted: int, status: Status, proved: bool, tmp_path: Path) -> None:
+    delivery = node("DELIVERY", "Behavior", "", f"{FIRST} ; c:postcondition :more{lasts(0)}{lasts(5, 'happensAt')}")
+    tank = "c:about :tank ; c:situationType :LEVEL"
+    more = f":more a owl:NamedIndividual, c:AmountEffect ; {tank} ; c:change 'increase' ; c:amount 1 ."
+    goal = f":full a owl:NamedIndividual, c:Comparison ; {tank} ; c:sign '>=' ; c:amount {wanted} ."
+    outcome = (
+        load(tmp_path, delivery, more, goal, node("task", "Task", "", " ; c:goal :full")).plan(optimal=proved).outcome
+    )
+    assert outcome.status is status
+    assert ("happens only once, at 5 s" in str(outcome.reason)) is (status is Status.GAVE_UP)
+
+
+def test_a_makespan_is_no_bound_of_plans_that_leave_a_soft_goal_unmet(tmp_path: Path) -> None:
+    parts = [
+        node(name.upper(), "Behavior", "", f" ; c:level 1 ; c:index {n} ; c:postcondition :{name}.on{lasts(9 * n)}")
+        + node(f"{name}.on", "ValueEffect", name)
+        for n, name in ((1, "b"), (2, "b2"))
+    ]
+    goals = node("task", "Task", "", " ; c:goal :hard, :soft") + node("hard", "ValueCondition", "b")
+    for weight, bounded in (("", True), (" ; c:weight 50", False)):
+        timed = (
+            load(tmp_path, *parts, goals, node("soft", "ValueCondition", "b2", weight)).plan(minimise="makespan").timed
+        )
+        assert timed is not None
+        assert bool(timed.least) is bounded
+        assert ("no plan is shorter" in headline(timed)) is bounded
+
+
+def blinking(name: str, level: int, more: str = "") -> str:
+    """Return a behaviour of 4 s that keeps a switch on and then turns its second switch on."""
+    ends = f"{name}.starts, :{name}.ends, :{name}.off"
+    return (
+        node(
+            name.upper(),
+            "Behavior",
+            "",
+            f" ; c:level {level} ; c:index {ord(name) - 96} ; c:postcondition :{ends}{lasts(4)}{more}",
+        )
+        + node(f"{name}.starts", "ValueEffect", name, " ; c:during c:atStart")
+        + node(f"{name}.ends", "ValueEffect", f"{name}2", " ; c:during c:atEnd")
+        + node(f"{name}.off", "ValueEffect", name, " ; c:negated true ; c:during c:atEnd")
+    )
+
+
+def test_steps_whose_values_for_a_while_no_other_step_needs_may_have_soft_goals(tmp_path: Path) -> None:
+    goals = node("task", "Task", "", " ; c:goal :hard, :soft") + node("hard", "ValueCondition", "a2")
+    scene = load(
+        tmp_path, blinking("a", 1), blinking("b", 1), goals, node("soft", "ValueCondition", "b2", " ; c:weight 3")
+    )
+    result = scene.plan()
+    assert result.outcome.status is Status.SOLVED
+    assert sorted(step.behavior for step in result.plan.primitives) == ["A", "B"]
+
+
+def test_steps_that_a_constraint_keeps_apart_need_no_overlap(tmp_path: Path) -> None:
+    """A constraint on what holds during two steps of the lowest level isn't a need of one step for the other."""
+    never = """
+:ON c:fromLevel 2 . :versus a owl:ObjectProperty, owl:NamedIndividual, c:Relation ; rdfs:domain :Switch ; rdfs:range :Switch .
+:Switch c:hasSituationType :READY, :CLASH . :READY a owl:Class, owl:NamedIndividual, c:SituationType .
+:CLASH a owl:Class, owl:NamedIndividual, c:SituationType ; c:fromLevel 2 ; c:never true . :a :versus :b .
+:CLASH.rule a owl:NamedIndividual, c:Rule ; c:construct '''
+    CONSTRUCT { ?x :CLASH true } WHERE { ?x a :Switch ; :ON true ; :versus ?y . ?y a :Switch ; :ON true }''' .
+"""
+    steps, goals = "", node("task", "Task", "", " ; c:goal :a.ready, :b.ready")
+    for n, name in enumerate("ab", 1):
+        made = node(f"{name}.ends", "ValueEffect", f"{name}2", " ; c:during c:atEnd").replace(":ON", ":READY")
+        steps += blinking(name, 2).replace(node(f"{name}.ends", "ValueEffect", f"{name}2", " ; c:during c:atEnd"), made)
+        steps += node(f"UP{n}", "Behavior", "", f" ; c:level 1 ; c:index {n} ; c:postcondition :{name}.up")
+        steps += node(f"{name}.up", "ValueEffect", f"{name}2").replace(":ON", ":READY")
+        goals += node(f"{name}.ready", "ValueCondition", f"{name}2").replace(":ON", ":READY")
+    (tmp_path / "switches.ttl").write_text(HEAD[: HEAD.index(":a.on")] + never + steps + goals, "utf-8")
+    timed = confab.load(tmp_path / "switches.ttl").plan(minimise="makespan").timed
+    assert timed is not None
+    assert timed.makespan == 8
