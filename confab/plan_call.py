@@ -62,7 +62,7 @@ before a schedule always ends after this share, since the time left is for the s
 OURS_WORK = 10_000_000
 """Maximum work of Confab's own search (states times operators) before an engine is tried, if there is no time limit.
 
-The search does this maximum work in about twenty seconds.
+The search does this maximum work in ten to twenty seconds.
 """
 CHOICE = 0.25
 """The share of the remaining time in which a plan for one choice of soft goals is searched."""

@@ -5,7 +5,7 @@ if the goal is unreachable. `f` is g + weight · h; the state with the least f i
 cost of a plan; states with g + cut · h at or above this bound are dropped.
 
 If h is a lower bound and the weight is 1, the search finds a cheapest plan, and no plan is cheaper than the least f of the open
-states. The lower bounds are `nothing` (breadth-first search), `ways` (each goal separately) and LM-cut
+states. The lower bounds are `nothing` (breadth-first search), `each_goal_alone` and LM-cut
 (`confab.planner.hierarchical.bounds`).
 """
 
@@ -184,7 +184,7 @@ def each_goal_alone(task: Task) -> Estimate:
 
 
 def least(task: Task) -> float | None:
-    """Return the lower bound `ways` on the cost of every plan, or None if the bound is 0 or all operators cost the same."""
+    """Return the bound `each_goal_alone` on the cost of every plan, or None if it is 0 or all operators cost the same."""
     return (each_goal_alone(task)(task.initial) if len(set(task.costs)) > 1 else 0.0) or None
 
 

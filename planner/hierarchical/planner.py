@@ -9,12 +9,16 @@ workspace      the table of current values, the compiled behaviours, and the wor
 call           achieve one goal by steps of a level, and apply these steps to the table
 agenda         achieve the goals one after another; with larger budgets if all goals are blocked
 refinement     achieve targets on a level: replay a method, or search with one budget after another
+methods        stored refinements, with roles in place of individuals
+nogoods        stored failures of attempts with a scope
 search_budget  the limits of one search
 few_steps      search for a few relevant steps
+relevance      the steps that begin chains towards wanted values
 scope          ground and search a part of the world, on one level
 unsolvability  prove that there is no plan, or find a plan of the lowest level, during planning
-shortening     make the plan cheaper: other orders of the goals, removal of detours, windows
+shortening     make the plan cheaper: other orders of the goals, removal of detours, routes, windows
 windows        replace consecutive steps of a level by cheaper steps
+regrouping     find the upper-level steps that explain steps of a level
 =============  =====================================================================================
 
 A failed search of a level above the lowest never proves that there is no plan.

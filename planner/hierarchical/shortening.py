@@ -1,9 +1,9 @@
 """Shortening of a plan, by default with at most half of the effort of finding the plan.
 
-There are three ways, in this order: the goals are planned again in other orders, with the known refinements; steps whose changes
-cancel out are removed (`confab.planner.hierarchical.detours`); windows, that is consecutive steps of a level, are replaced by
-cheaper steps (`confab.planner.hierarchical.windows`), on the lowest level after changes of the order of all steps. The primitives
-after the first state with all goals are always dropped.
+There are four ways, in this order: the goals are planned again in other orders, with the known refinements; steps whose changes
+cancel out are removed (`confab.planner.hierarchical.detours`); on the lowest level, the order of all steps is changed
+(`confab.planner.grounded.routes`); windows, that is consecutive steps of a level, are replaced by cheaper steps
+(`confab.planner.hierarchical.windows`). The primitives after the first state with all goals are always dropped.
 
 Other orders are tried only if the plan moves an object away or has many steps per goal. Windows, which may refine several steps
 together, are used only if a shorter plan is likely. The cheapest plan is kept; among equally cheap plans, the plan with the

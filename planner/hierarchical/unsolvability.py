@@ -35,7 +35,7 @@ EASIER = 5
 FIRST_TESTS, AT_ONCE, PAIRS = 8_000, 20_000, 500_000
 """Maximum number of conditions that the search for a certificate tests.
 
-The first limit holds before a search, the second in the paper's mode, and the third after failed searches.
+The first limit holds before a search, the second for a single attempt, and the third after failed searches.
 """
 TEST = 8
 """Work of testing one condition, in the unit of `Workspace.effort`."""

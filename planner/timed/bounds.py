@@ -2,7 +2,7 @@
 
 The bound is the greater of two numbers. The first number is the longest chain: the least time after which a goal can hold if
 actors never wait for each other. The second number is the work of any plan, divided by the number of actors. The work is the sum of
-durations, counted for each actor of a step; `ways` and LM-cut bound the work from below.
+durations, counted for each actor of a step; `each_goal_alone` and LM-cut bound the work from below.
 """
 
 from __future__ import annotations
