@@ -257,7 +257,6 @@ def carry_out(
 
     scene.settle()
     problem = _whole_problem(scene, plan, several(goals))
-    check_goal(scene.iri, problem)
     begun = None if plan is None else plan_of(plan, problem)
     if begun is not None and problem.weights:  # the plan determines the soft goals to reach
         problem = problem.only(problem.weights.keys() & unmet_goals(problem, begun))
@@ -285,10 +284,16 @@ def carry_out(
 def _whole_problem(scene: Known, plan: AnyPlan | None, goals: Sequence[str]) -> Problem:
     """Return the problem of the whole scene, with the given goals or, if `plan` is a result, with the goals of the result.
 
-    The part of the scene that was read for the first plan may be too small for plans that are made during execution.
+    The part of the scene that was read for the first plan may be too small for plans that are made during execution. A result that
+    leaves all soft goals unmet may have no goals.
     """
     whole = getattr(plan, "in_whole_scene", None)
-    return with_goals(scene.reading.problem, goals) if whole is None else whole().problem
+    if whole is not None:
+        result: Problem = whole().problem
+        return result
+    problem = with_goals(scene.reading.problem, goals)
+    check_goal(scene.iri, problem)
+    return problem
 
 
 def planner_of(mode: Mode, memory: Links | None = None) -> Planner | None:

@@ -340,7 +340,8 @@ class _SoftGoalChoices:
 
     def why(self, other: Goals) -> str:
         """Return why a choice has no plan: there is none, a limit ended the search, or the search found none."""
-        if (found := self.outcomes.get(other)) is not None and found.status is Status.UNSOLVABLE:
+        found = self.outcomes.get(other)
+        if found is not None and found.status is Status.UNSOLVABLE and self.away <= other:
             return "no plan meets it and the other goals"
         none = "no plan that meets it and the other goals was found"
         if found is None and self.ended:
@@ -348,9 +349,15 @@ class _SoftGoalChoices:
         return f"{none}: {found.reason.text.split(';')[0]}" if found is not None and found.reason is not None else none
 
     def more(self, chosen: Goals, symbol: Symbol) -> Fraction | None:
-        """Return the additional cost of meeting an unmet soft goal, as the difference of plans for which the same work was done."""
+        """Return the additional cost of meeting an unmet soft goal, as the difference of plans for which the same work was done.
+
+        If there is no plan for the goal and the chosen goals alone, a plan may meet further goals, which release rest values.
+        """
         other = chosen | {symbol}
         if self.cost(other) is None:
-            return None
+            more = [
+                self.price(found) for kept, found in self.outcomes.items() if kept > other and found.plan is not None
+            ]
+            return min(more) - self.price(self.outcomes[chosen]) if more else None
         found = self.briefly if other in self.briefly else self.outcomes
         return self.price(found[other]) - self.price(found[chosen])

@@ -210,12 +210,11 @@ class Problem:
 
     def superclasses(self, kind: str) -> set[str]:
         """Return a class with all its superclasses."""
-        return closure([kind], lambda each: self.parents.get(each, ()))
+        return superclasses(kind, self.parents)
 
     def below(self, kind: str, other: str) -> bool:
         """Return whether every individual of a class or union of classes belongs to another class or union."""
-        above = {*other.split("|"), other}
-        return not any(self.superclasses(part).isdisjoint(above) for part in kind.split("|"))
+        return below(kind, other, self.parents)
 
     @cached_property
     def individuals(self) -> frozenset[str]:
@@ -260,6 +259,17 @@ class Problem:
     @cached_property
     def _ranks(self) -> Mapping[str, Mapping[str, int]]:
         return {kind: {member: i for i, member in enumerate(members)} for kind, members in self.classes.items()}
+
+
+def superclasses(kind: str, parents: Mapping[str, Sequence[str]]) -> set[str]:
+    """Return a class with all its superclasses; `parents` has the direct superclasses."""
+    return closure([kind], lambda each: parents.get(each, ()))
+
+
+def below(kind: str, other: str, parents: Mapping[str, Sequence[str]]) -> bool:
+    """Return whether every individual of a class or union of classes belongs to another class or union."""
+    above = {*other.split("|"), other}
+    return not any(superclasses(part, parents).isdisjoint(above) for part in kind.split("|"))
 
 
 def read_through(symbol: Symbol, domain: Domain) -> set[tuple[str, tuple[str, ...]]]:

@@ -6,6 +6,7 @@ from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
+from typing import TypeVar
 
 from confab.reasoner.aggregates.dependencies import in_order, read_by, unfolded
 from confab.reasoner.aggregates.extrema import extrema_replaced
@@ -17,7 +18,7 @@ from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.language import DomainError, walk
 from confab.reasoner.limits import checked
 from confab.reasoner.names import Names, local_name
-from confab.reasoner.problem import Domain
+from confab.reasoner.problem import Domain, below
 from confab.reasoner.reading import swrl
 from confab.reasoner.reading.definitions import THING, Definitions
 from confab.reasoner.reading.facts import individuals_named
@@ -40,7 +41,9 @@ from confab.reasoner.symbols import (
     Aggregate,
     AmountEffect,
     Behavior,
+    ClassCondition,
     Comparison,
+    Condition,
     Constraint,
     Parameter,
     Perceived,
@@ -52,6 +55,7 @@ from confab.reasoner.symbols import (
 from confab.reasoner.vocabulary import CORE, EMBODIMENT, RDFS
 
 WITH_CLASS = ("AbsenceCondition", "ClassCondition")
+Derived = TypeVar("Derived", Rule, Aggregate)
 
 
 class _Whole(Names):
@@ -121,8 +125,13 @@ def frame(
     else:
         in_order = sorted(ordered(schema.of_kind("Behavior"), nodes, names), key=parts.level)
         lifted = {names.short(iri): parts.behavior(iri) for iri in in_order}
-    rules = _rules(parts, schema, {s.name: s for s in situations}) | before.rules
-    aggregates = _aggregates(parts, schema, {s.name: s for s in situations}, rules, constraints)
+    kinds = {s.name: s for s in situations}
+    stated = _rules(parts, schema, kinds)
+    rules = {
+        name: tuple(_of_class(one, kinds[name], parents) for one in its) for name, its in stated.items()
+    } | before.rules
+    derived = _aggregates(parts, schema, kinds, rules, constraints)
+    aggregates = {name: _of_class(one, kinds[name], parents) for name, one in derived.items()}
     domain = Domain(
         situations={s.name: s for s in _on_their_levels(situations, rules, aggregates, before)},
         behaviors=lifted,
@@ -239,6 +248,13 @@ def _rules(
             or parts.names.iri(name),
         )
     return found
+
+
+def _of_class(one: Derived, kind: SituationType, parents: Mapping[str, Sequence[str]]) -> Derived:
+    """Return a rule that concludes nothing about individuals outside of the classes that have its situation type."""
+    heads = zip(one.parameters, kind.arguments, strict=True)
+    more: list[Condition] = [ClassCondition(p.name, of) for p, of in heads if not below(p.kind, of, parents)]
+    return replace(one, conditions=(*more, *one.conditions)) if more else one
 
 
 def _aggregates(

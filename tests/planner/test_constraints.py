@@ -169,6 +169,12 @@ def test_a_schedule_keeps_a_constraint_at_every_time_and_without_it_overlaps(tmp
     assert times == [120, 60]
 
 
+def test_a_constraint_on_a_total_of_totals_that_stays_the_same_forbids_nothing() -> None:
+    """Each step moves one individual from one count to another, so that the sum of the counts stays 2."""
+    outcome = confab.load(Path(__file__).parent / "cases" / "total-of-totals.ttl").plan().outcome
+    assert outcome.status is Status.SOLVED
+
+
 def test_a_bounded_count_that_a_step_raises_and_lowers_again_is_kept_on_two_levels() -> None:
     timed = confab.load(Path(__file__).parent / "cases" / "ovens-in-levels.ttl").plan(minimise="makespan").timed
     assert timed is not None

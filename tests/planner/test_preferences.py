@@ -263,6 +263,45 @@ def test_each_goal_with_a_weight_counts_once_whatever_other_goals_require_of_its
         assert not result.faults(result.plan)
 
 
+LAMPS = """
+@prefix : <https://example.org/lamps#> .
+@prefix c: <https://w3id.org/confab/core#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+@prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
+<https://example.org/lamps> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> ; c:symbolicOnly true .
+:Lamp a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object ; c:hasSituationType :LIT, :ODD .
+:Room a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object ; c:hasSituationType :LAMPS .
+:LIT a owl:Class, owl:NamedIndividual, c:SituationType ; c:restValue c:true .
+:ODD a owl:Class, owl:NamedIndividual, c:SituationType ; c:never true .
+:LAMPS a owl:NamedIndividual, c:SituationType, c:Amount ; c:valueProperty :lamps .
+:lamps a owl:DatatypeProperty, owl:FunctionalProperty, owl:NamedIndividual ; rdfs:domain :Room ; rdfs:range xsd:decimal .
+:odd a owl:NamedIndividual, c:Rule ; c:construct '''CONSTRUCT { ?x :ODD true }
+  WHERE { ?x a :Lamp ; :LIT true FILTER NOT EXISTS { :a :LIT true } }''' .
+:many a owl:NamedIndividual, c:Rule ; c:construct '''CONSTRUCT { ?room :lamps ?n }
+  WHERE { SELECT ?room (COUNT(?x) AS ?n) WHERE { ?room a :Room . ?x a :Lamp ; :LIT true } GROUP BY ?room }''' .
+:DARKEN a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 1 ; c:update '''
+  DELETE { ?x :LIT true } WHERE { ?x a :Lamp }''' .
+:a a owl:NamedIndividual, :Lamp . :b a owl:NamedIndividual, :Lamp .
+:a.lit a owl:NamedIndividual, c:SituatedObjectInstance ; c:about :a ; c:situationType :LIT .
+:b.lit a owl:NamedIndividual, c:SituatedObjectInstance ; c:about :b ; c:situationType :LIT .
+ :room a owl:NamedIndividual, :Room .
+[] a owl:AllDifferent ; owl:distinctMembers ( :a :b :room ) .
+:task a owl:NamedIndividual, c:Task ; c:goal :dark, :empty .
+:dark a owl:NamedIndividual, c:ValueCondition ; c:about :a ; c:situationType :LIT ; c:negated true ; c:weight 1 .
+:empty a owl:NamedIndividual, c:Comparison ; c:about :room ; c:situationType :LAMPS ; c:sign '<' ; c:amount 1 ; c:weight 1 .
+"""
+"""Lamp a may be dark only if all lamps are dark, which only the goal of a dark room allows in the end."""
+
+
+def test_a_goal_that_only_another_unmet_goal_makes_possible_has_the_price_of_both(tmp_path: Path) -> None:
+    (tmp_path / "lamps.ttl").write_text(LAMPS, "utf-8")
+    scene = confab.load(tmp_path / "lamps.ttl")
+    result = scene.plan()
+    assert {str(one.fact.symbol): one.price for one in result.outcome.forgone} == {"<a, LIT>": 2, "<room, LAMPS>": 2}
+    assert scene.execute(result).reached
+
+
 @pytest.mark.parametrize("given", ["nothing", "a result", "a plan", "a file"])
 def test_execution_leaves_the_same_goals_unmet(given: str, tmp_path: Path) -> None:
     scene = confab.load("wishes-small")

@@ -288,3 +288,11 @@ def test_a_class_that_becomes_conditions_has_no_situation_type(tmp_path: Path, t
     path = scene(tmp_path, defined(both(":Item", "[ a owl:Class ; owl:complementOf :Sink ]")), tired)
     with pytest.raises(KnowledgeError, match="TIRED is a situation type of Special, but"):
         read(load(path))
+
+
+def test_a_rule_concludes_nothing_about_individuals_that_lack_its_situation_type() -> None:
+    """The total adds up individuals of which a rule concludes D0, but no class of these individuals has D0."""
+    problem = read(load(Path(__file__).parents[1] / "planner" / "cases" / "rule-of-another-class.ttl")).problem
+    facts = LoggedState(problem, problem.initial)
+    assert facts.value("S0", ("z3",)) == "0"
+    assert facts.value("D0", ("a1",)) in (None, "false")
