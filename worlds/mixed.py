@@ -507,7 +507,7 @@ class _Draft(Vocabulary):
         rng = self.rng
         members = tuple(f"{name}v{i}" for i in range(rng.choice((2, 2, 3))))
         target = rng.choice(("A", "B", "B") if self.crowd else ("", "", "", "A", "B"))
-        target = self.kind(target) if target else ""
+        target = self.kind(target, self.owning) if target else ""
         if target:
             members = members[: rng.choice((0, 1, 1, 2))]
             if len({*members, *self.classes[target]}) < 2:

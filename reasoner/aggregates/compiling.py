@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, islice
 
+from confab.reasoner.afterwards import TooManyCasesError
 from confab.reasoner.aggregates import keeping
 from confab.reasoner.aggregates.keeping import MOST_CONDITIONS
-from confab.reasoner.aggregates.remembering import in_order_of_update, remembering
+from confab.reasoner.aggregates.remembering import in_order_of_update, remembering, stated
 from confab.reasoner.effects import spread
 from confab.reasoner.folding import Folding
 from confab.reasoner.language import DomainError, mentions, walk
@@ -32,15 +33,21 @@ def compiled(domain: Domain, classes: Mapping[str, Sequence[str]]) -> Domain:
     for name, behavior in domain.behaviors.items():
         check("deriving amounts")
         for one in updated:
-            if one.situation in domain.remembers:
-                behavior = remembering(behavior, one, domain, classes)
-            else:
-                behavior = keeping.kept(behavior, (one,), domain.situations, classes)
+            try:
+                if one.situation in domain.remembers:
+                    behavior = remembering(behavior, one, domain, classes)
+                else:
+                    behavior = keeping.kept(behavior, (one,), domain.situations, classes)
+            except TooManyCasesError:
+                raise DomainError(
+                    f"{name} changes the facts that determine {stated(one.situation, domain)} by too many effects at once; "
+                    "use fewer effects, or another behaviour for some of them"
+                ) from None
         behaviors[name] = _folded(spread(_prevented(behavior, domain, classes), classes), domain, classes)
         conditions = chain.from_iterable(map(walk, behaviors[name].conditions))
         many = sum(1 for _ in islice(conditions, MOST_CONDITIONS + 1))
         if updated and many > MOST_CONDITIONS:
-            kept = " and ".join(sorted(domain.aggregates.keys() | domain.remembers.keys()))
+            kept = " and ".join(sorted({stated(one.situation, domain) for one in updated}))
             raise DomainError(
                 f"{name}: the effects that keep {kept} take more than {MOST_CONDITIONS} "
                 "conditions; let fewer of its effects change them, or let no derived amount depend on another"

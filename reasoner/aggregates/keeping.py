@@ -39,7 +39,7 @@ from confab.reasoner.afterwards import (
 from confab.reasoner.aggregates.dependencies import divides, existing, read_by
 from confab.reasoner.amounts import Amount, Calculation, Expression, inside, put_in, terms_of
 from confab.reasoner.effects import made_of
-from confab.reasoner.language import DomainError, groups, is_variable, mentions, substituted, walk
+from confab.reasoner.language import groups, is_variable, mentions, substituted, walk
 from confab.reasoner.limits import check
 from confab.reasoner.symbols import (
     Aggregate,
@@ -81,19 +81,13 @@ def kept(
 
     Raises
     ------
-    DomainError
+    TooManyCasesError
         Too many effects of the behaviour change the same total.
     """
     for aggregate in aggregates:
         if aggregate.kept and read_by(aggregate) & behavior.changes:
-            try:
-                found = _Keeping(behavior, aggregate, situations, classes).behavior()
-                behavior = found if found.timing is None else _timed(found, aggregate, situations, classes)
-            except TooManyCasesError:
-                raise DomainError(
-                    f"{behavior.name} changes the facts that determine {aggregate.situation} by too many effects at once; "
-                    "use fewer effects, or another behaviour for some of them"
-                ) from None
+            found = _Keeping(behavior, aggregate, situations, classes).behavior()
+            behavior = found if found.timing is None else _timed(found, aggregate, situations, classes)
     return behavior
 
 

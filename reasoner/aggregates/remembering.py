@@ -67,6 +67,15 @@ def count_of(name: str, domain: Domain) -> Aggregate:
     return unfolded(replace(count, parameters=count.variables, variables=()), domain.rules)
 
 
+def stated(name: str, domain: Domain) -> str:
+    """Return what a count or a remembered situation type expresses: itself, or the constraint for which Confab added it."""
+    added = name in domain.situations and domain.situations[name].added
+    for key, one in domain.constraints.items():
+        if key == name or (added and one.about and name.startswith(f"{one.about[0]}.")):
+            return f"the constraint that {one}"
+    return name
+
+
 def remembering(behavior: Behavior, count: Aggregate, domain: Domain, classes: Mapping[str, Sequence[str]]) -> Behavior:
     """Return a behaviour that makes a remembered symbol true if the original symbol is true after the behaviour.
 
@@ -84,14 +93,16 @@ def remembering(behavior: Behavior, count: Aggregate, domain: Domain, classes: M
     Raises
     ------
     DomainError
-        The behaviour has a duration, or too many of its effects change the same remembered situation type.
+        The behaviour has a duration.
+    TooManyCasesError
+        Too many effects of the behaviour change the same remembered situation type.
     """
     if not read_by(count) & behavior.changes or behavior.level < domain.situations[count.situation].level:
         return behavior
     if behavior.timing is not None:
         raise DomainError(
-            f"{behavior.name} has a duration and changes what {count.situation} remembers; leave the duration out, or the "
-            "condition about earlier states (c:remembers, c:atMostOnce, c:onlyAfter)"
+            f"{behavior.name} has a duration and changes what {stated(count.situation, domain)} remembers; leave the duration "
+            "out, or the condition about earlier states (c:remembers, c:atMostOnce, c:onlyAfter)"
         )
     situations = {
         **domain.situations,

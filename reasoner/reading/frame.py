@@ -409,8 +409,18 @@ def _check_behavior(behavior: Behavior, domain: Domain) -> None:
             )
 
 
-def _check_classes(schema: Parts, iri: str, owners: Sequence[str]) -> None:
-    """Raise `KnowledgeError` if conditions define a class whose individuals have a situation type."""
+def _check_classes(schema: Parts, iri: str, owners: Sequence[str], supers: Mapping[str, Sequence[str]]) -> None:
+    """Raise `KnowledgeError` if conditions define a class whose individuals have a situation type or are its values."""
+    for kind in filter(schema.definitions.changes, sorted(supers)):
+        base = schema.definitions.base(kind)
+        above, implied = (closure([each], lambda one: supers.get(one, ())) for each in (kind, base))
+        if iri in above - implied:
+            raise KnowledgeError(
+                f"{local_name(kind)} is a subclass of the situation type {local_name(iri)}, but the definition of "
+                f"{local_name(kind)} becomes conditions, so its members can't be values; make {local_name(base)} the subclass, or "
+                "state the values one by one",
+                iri,
+            )
     for kind in (*owners, *(schema.one(parameter, "termType") for parameter in schema.values(iri, "parameter"))):
         if schema.definitions.changes(kind):
             base = local_name(schema.definitions.base(kind))
@@ -430,7 +440,7 @@ def _situations(
     for iri in sorted(read.of_kind("SituationType"), key=schema.names.short):
         name = schema.names.short(iri)
         owners = [kind for kind, situation in read.owners if situation == iri]
-        _check_classes(schema, iri, owners)
+        _check_classes(schema, iri, owners, read.supers)
         owning = list(map(schema.names.short, owners))
         parameters = [schema.parameter(p) for p in ordered(schema.values(iri, "parameter"), schema.nodes, schema.names)]
         arguments = tuple(p.kind for p in parameters) or ((_union(owning, classes),) if owning else ())

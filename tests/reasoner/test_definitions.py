@@ -290,6 +290,13 @@ def test_a_class_that_becomes_conditions_has_no_situation_type(tmp_path: Path, t
         read(load(path))
 
 
+def test_a_class_that_becomes_conditions_has_no_values(tmp_path: Path) -> None:
+    below = ":Special rdfs:subClassOf :NEAR . :NEAR a owl:Class, owl:NamedIndividual, c:SituationType ."
+    path = scene(tmp_path, defined(both(":Item", "[ a owl:Class ; owl:complementOf :Sink ]")), below)
+    with pytest.raises(KnowledgeError, match="Special is a subclass of the situation type NEAR, but"):
+        read(load(path))
+
+
 def test_a_rule_concludes_nothing_about_individuals_that_lack_its_situation_type() -> None:
     """The total adds up individuals of which a rule concludes D0, but no class of these individuals has D0."""
     problem = read(load(Path(__file__).parents[1] / "planner" / "cases" / "rule-of-another-class.ttl")).problem
