@@ -122,7 +122,10 @@ class Afterwards:
     def __post_init__(self) -> None:
         """Record the values that the preconditions determine."""
         preconditions = self.behavior.preconditions
-        bound = {p.name for p in self.behavior.parameters}.union(*map(mentions, preconditions))
+        plain = (
+            mentions(condition) for condition in preconditions if not groups(condition)
+        )  # others are local variables
+        bound = {p.name for p in self.behavior.parameters}.union(*plain)
         self._fixed = frozenset(bound)
         preconditions = preconditions if self.holding is None else tuple(self.holding)
         self._known = {

@@ -630,9 +630,12 @@ class Judge:
         each task without a plan, and certificates of facts and of pairs for some of these tasks, so a missing certificate is a
         remark. The checker must reject certificates that have lost a claim or have a false one.
         """
+        problem = self.call("the whole scene", lambda: read.reading.problem)
+        if problem is None:  # too many effects for the whole scene, but not for the part that the task needs
+            return
         for kind in ("all", *KINDS):
-            self.proofs_of(read.reading.problem, kind)
-        self.call("proofs by a search", lambda: self.searched(read.reading.problem))
+            self.proofs_of(problem, kind)
+        self.call("proofs by a search", lambda: self.searched(problem))
 
     def proofs_of(self, problem: Problem, kind: str, known: Certificate | None = None) -> None:
         """Search for a certificate of one kind, and judge it unless it is the known certificate."""

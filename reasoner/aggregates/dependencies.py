@@ -6,10 +6,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import count
 
+from confab.reasoner.afterwards import closed
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, inside, situations_in
 from confab.reasoner.closure import closure
 from confab.reasoner.derivation import circular
-from confab.reasoner.language import DomainError, situations_of, substituted, walk
+from confab.reasoner.language import DomainError, groups, mentions, situations_of, substituted, walk
 from confab.reasoner.symbols import (
     FALSE,
     Aggregate,
@@ -18,6 +19,7 @@ from confab.reasoner.symbols import (
     Comparison,
     Condition,
     Rule,
+    SituationType,
     ValueCondition,
     Witness,
 )
@@ -65,8 +67,12 @@ def _followed(situations: frozenset[str], rules: Mapping[str, Sequence[Rule]]) -
     return closure(situations, named)
 
 
-def unfolded(aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]]) -> Aggregate:
+def unfolded(
+    aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]], situations: Mapping[str, SituationType]
+) -> Aggregate:
     """Return an equivalent aggregate whose conditions contain the definitions of derived situation types instead of these types.
+
+    A situation that doesn't exist, because an individual isn't of the class that has the situation type, is neither true nor false.
 
     Raises
     ------
@@ -86,7 +92,10 @@ def unfolded(aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]]) -> Aggre
         match condition:
             case ValueCondition(situation, arguments, value, negated) if situation in rules:
                 bodies = tuple(body(rule, arguments) for rule in rules[situation])
-                return AnyOf(bodies, negated is not (value == FALSE))
+                if value != FALSE:
+                    return AnyOf(bodies, negated)
+                of = zip(arguments, situations[situation].arguments, strict=True)
+                return AnyOf(((*(ClassCondition(a, kind) for a, kind in of), AnyOf(bodies, negated=True)),), negated)
             case Witness(_, _, inner):
                 return replace(condition, conditions=tuple(map(one, inner)))
             case AnyOf(alternatives):
@@ -98,13 +107,18 @@ def unfolded(aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]]) -> Aggre
         number = next(numbers)
         terms = dict(zip((p.name for p in rule.parameters), arguments, strict=True))
         terms |= {v.name: f"{v.name}_rule{number}" for v in rule.variables}
-        found = tuple(one(substituted(condition, terms)) for condition in rule.conditions)
+        plain = {
+            term for c in rule.conditions if not groups(c) for term in mentions(c)
+        }  # others are local to a disjunction
+        asked = closed(rule.conditions, frozenset(plain | {p.name for p in rule.parameters}), rule.behavior.kinds)
+        found = tuple(one(substituted(condition, terms)) for condition in asked)
         for variable in rule.variables:
-            found = (Witness(terms[variable.name], variable.kind, found),)
+            if variable.name in plain:
+                found = (Witness(terms[variable.name], variable.kind, found),)
         members = (ClassCondition(terms[p.name], p.kind) for p in rule.parameters)
         return (*members, *found)
 
-    return unfolded(replace(aggregate, conditions=tuple(map(one, aggregate.conditions))), rules)
+    return unfolded(replace(aggregate, conditions=tuple(map(one, aggregate.conditions))), rules, situations)
 
 
 def existing(aggregate: Aggregate) -> tuple[Condition, ...]:

@@ -64,7 +64,7 @@ def count_of(name: str, domain: Domain) -> Aggregate:
     """
     source = domain.remembers[name]
     count = solutions_of(name, replace(domain.situations[source], arguments=domain.situations[name].arguments))
-    return unfolded(replace(count, parameters=count.variables, variables=()), domain.rules)
+    return unfolded(replace(count, parameters=count.variables, variables=()), domain.rules, domain.situations)
 
 
 def stated(name: str, domain: Domain) -> str:

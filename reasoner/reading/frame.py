@@ -283,7 +283,7 @@ def _aggregates(
                     effect,
                 )
         try:
-            found[name] = unfolded(parts.aggregate(iri, situations[name].arguments), rules)
+            found[name] = unfolded(parts.aggregate(iri, situations[name].arguments), rules, situations)
         except DomainError as error:
             raise KnowledgeError(f"<{iri}>: {error}", iri) from None
         quantity = situations[name].quantity
@@ -295,7 +295,9 @@ def _aggregates(
             )
     for name, constraint in constraints.items():
         try:
-            found[name] = unfolded(solutions_of(name, situations[constraint.situation], constraint.always), rules)
+            found[name] = unfolded(
+                solutions_of(name, situations[constraint.situation], constraint.always), rules, situations
+            )
         except DomainError:
             raise KnowledgeError(
                 f"{constraint}, but it is defined recursively; constrain a situation type whose definition isn't recursive",

@@ -54,7 +54,10 @@ d:OVER.rule a owl:NamedIndividual, c:Rule ; c:construct """
 def test_effects_keep_each_total_as_its_rule_derives_it_in_every_state(seed: int) -> None:
     derived = mixed(seed).problem
     level = derived.domain.levels[-1]
-    aggregates = {name: unfolded(one, derived.domain.rules) for name, one in derived.domain.aggregates.items()}
+    aggregates = {
+        name: unfolded(one, derived.domain.rules, derived.domain.situations)
+        for name, one in derived.domain.aggregates.items()
+    }
     domain = compiled(replace(derived.domain, aggregates=aggregates), derived.classes)
     extrema = {name for name, one in derived.domain.aggregates.items() if not one.kept}
     situations = {name: kind for name, kind in domain.situations.items() if name not in extrema}

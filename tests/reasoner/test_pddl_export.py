@@ -66,7 +66,10 @@ def round_trip(problem: Problem, level: int | None = None) -> Problem:
 @pytest.mark.parametrize("seed", range(7_000_001, 7_000_009))
 def test_a_random_world_costs_the_same_behind_its_export_on_every_level(seed: int) -> None:
     meant = mixed(seed).problem
-    aggregates = {name: unfolded(one, meant.domain.rules) for name, one in meant.domain.aggregates.items()}
+    aggregates = {
+        name: unfolded(one, meant.domain.rules, meant.domain.situations)
+        for name, one in meant.domain.aggregates.items()
+    }
     domain = compiled(replace(meant.domain, aggregates=aggregates), meant.classes)
     initial = with_totals(domain, meant.classes, meant.relations, meant.initial)
     problem = replace(meant, scene="x/d/p", domain=domain, initial=initial)
