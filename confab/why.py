@@ -438,9 +438,11 @@ def _fact_told(
     replan: Replan,
     soft: Sequence[SoftGoal],
 ) -> WhyNot:
-    about, of, *_ = fact.split()
+    about, of, *rest = fact.split()
+    situation = problem.domain.situations.get(of)
+    asked_of = Symbol(of, (about, *rest[: 0 if situation is None else len(situation.arguments) - 1]))
     given = [Fact(*goal) for goal in sorted(problem.goal.items())]
-    replaced = [goal for goal in given if goal.symbol == Symbol(of, (about,))]
+    replaced = [goal for goal in given if goal.symbol == asked_of]
     goals = [str(goal) for goal in given if goal not in replaced]
     try:
         symbol, value = parse_fact(problem, fact)

@@ -17,6 +17,8 @@ from confab.planner.plan_costs import cost_of
 from confab.planner.validation import validate
 from confab.reasoner.memory.experience import ITSELF
 
+GUESTS = Path(__file__).parent / "cases" / "guests.ttl"
+
 DOMAIN = """(define (domain lamps) (:requirements :strips :typing) (:types lamp room)
  (:predicates (in ?r - room) (door ?a ?b - room) (lit ?l - lamp) (hangs ?l - lamp ?r - room))
  (:action walk :parameters (?a ?b - room) :precondition (and (in ?a) (door ?a ?b)) :effect (and (in ?b) (not (in ?a))))
@@ -498,3 +500,13 @@ def test_the_answer_names_a_soft_goal_that_only_the_plan_without_the_alternative
 def test_the_answer_names_a_soft_goal_that_only_the_plan_with_the_alternative_meets() -> None:
     told = confab.load("wishes-small").plan().why_not("paper IN shop")
     assert ", with the soft goal (weight 8) that store stock 0, is possible" in told.answer
+
+
+def test_an_alternative_to_a_goal_about_two_individuals_takes_the_place_of_this_goal() -> None:
+    result = confab.load(GUESTS).plan(["guest1 KNOWS guest2", "guest2 KNOWS guest1"])
+    assert "this is a goal already" in result.why_not("guest1 KNOWS guest2").answer
+    told = result.why_not("guest1 KNOWS guest2 false")
+    assert "in place of the goal that guest 1 KNOWS guest 2, is possible" in told.answer
+    assert told.more == -1
+    assert told.plan is not None
+    assert [step.arguments for step in told.plan if step.behavior == "PRESENT"] == [("guest2", "guest1")]
