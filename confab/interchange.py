@@ -160,7 +160,7 @@ def read_plan(path: Path, problem: Problem) -> Plan:
     """
     data = _json(path, "plan")
     status = data.get("status", Status.SOLVED.value) if isinstance(data, dict) else None
-    if status is None or not isinstance(data.get("steps"), list) or not data["steps"]:
+    if status is None or not isinstance(data.get("steps"), list):
         what = f"its status is '{status}'" if status not in (None, "solved", "reached") else "it has no 'steps'"
         raise KnowledgeError(
             f"{path}: holds no plan: {what}; wanted what 'confab plan --json' prints of a solved scene"

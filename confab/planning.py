@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter
@@ -17,10 +18,12 @@ from confab.interchange import outcome_json
 from confab.known import Known
 from confab.plan_call import PlanningTask, Searching, own_request, planned, read_task
 from confab.plan_options import PlanOptions
-from confab.planner.plan import Outcome, Plan, SoftGoal, Status, Step, paused_collection, renumbered
+from confab.planner.plan import Forgone, Outcome, Plan, SoftGoal, Status, Step, paused_collection, renumbered
+from confab.planner.plan_costs import stated_cost
 from confab.planner.solve import DEFAULT_MODE, Mode, solve
 from confab.planner.timed.plan import schedule_of
 from confab.planner.validation import Fault, unmet_goals, validate
+from confab.reasoner.derivation import conditions_of_goal
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.kinds import PLAN
 from confab.reasoner.limits import Deadline, within
@@ -161,16 +164,24 @@ def result_of(scene: Known, plan: Plan, goals: Facts = ()) -> Result:
         The plan isn't valid in the scene; the message has the first fault.
     """
     texts = tuple(several(goals))
-    problem = with_goals(scene.problem, texts)
+    task = problem = with_goals(scene.problem, texts)
+    penalty, forgone = None, list[Forgone]()
     if not needs_others_meanwhile(problem):
-        problem = problem.only(problem.weights.keys() & unmet_goals(problem, plan))
+        unmet = task.weights.keys() & unmet_goals(task, plan)
+        problem = task.only(unmet)
         if faults := validate(problem, plan):
             alone = "; its steps are read without their times: if they have to overlap, plan again"
             raise KnowledgeError(
                 f"the plan isn't valid in this scene with these goals: {faults[0].text}"
                 f"{alone if may_overlap_by_need(problem) else ''}"
             )
-    return Result(scene, problem, Outcome(Status.SOLVED, plan), dict(scene.seconds), goals=texts)
+        left = [Fact(one, task.goal[one]) for one in task.weights if one in unmet]
+        forgone = [
+            Forgone(one, task.weights[one.symbol], None, conditions_of_goal(task.domain, one.symbol)) for one in left
+        ]
+        penalty = sum((one.weight for one in forgone), Fraction(0)) if task.weights else None
+    outcome = Outcome(Status.SOLVED, plan, cost=stated_cost(problem, plan), penalty=penalty, forgone=tuple(forgone))
+    return Result(scene, problem, outcome, dict(scene.seconds), goals=texts)
 
 
 class NoPlanError(KnowledgeError):

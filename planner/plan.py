@@ -331,8 +331,8 @@ class SoftGoal(NamedTuple):
 class Forgone:
     """A soft goal that a plan leaves unmet, with the cost `weight` of leaving it unmet.
 
-    `price` is the additional cost of a plan that also meets the goal, or None if no such plan was found; `why` then states why.
-    `conditions` are the conditions of a goal with alternatives or quantifiers.
+    `price` is the additional cost of a plan that also meets the goal, or None if no such plan is known; `why` then states why,
+    if such a plan was searched. `conditions` are the conditions of a goal with alternatives or quantifiers.
     """
 
     fact: Fact
@@ -342,9 +342,10 @@ class Forgone:
     why: str = ""
 
     def __str__(self) -> str:
-        more = self.why if self.price is None else f"it would cost at most {written(self.price)} more"
+        more = f"; {self.why}" if self.why else ""
+        more = more if self.price is None else f"; it would cost at most {written(self.price)} more"
         goal = " and ".join(map(said, self.conditions))
-        return f"{self.fact}{goal and f', which means {goal}'} (weight {written(self.weight)}; {more})"
+        return f"{self.fact}{goal and f', which means {goal}'} (weight {written(self.weight)}{more})"
 
 
 @known_as("an outcome")

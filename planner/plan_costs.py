@@ -35,6 +35,12 @@ def cost_of(problem: Problem, plan: Plan) -> float:
     return sum(costs(problem, plan.primitives))
 
 
+def stated_cost(problem: Problem, plan: Plan) -> float | None:
+    """Return the cost of a plan; None if every primitive of the problem costs 1."""
+    behaviors = problem.domain.behaviors.values()
+    return cost_of(problem, plan) if any(one.price is not None or one.cost != 1.0 for one in behaviors) else None
+
+
 def compared(problem: Problem, primitives: Sequence[Primitive]) -> float:
     """Return the quantity that shortening minimises: the cost of primitives and, among equal costs, their number."""
     return sum(costs(problem, primitives)) + TRIFLE * len(primitives)

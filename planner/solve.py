@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 from confab.planner.certified import certified
 from confab.planner.levels import levels_left
 from confab.planner.plan import OUT_OF_MEMORY, Limits, Outcome, Reason, Status, UnsolvableError
-from confab.planner.plan_costs import cost_of
+from confab.planner.plan_costs import stated_cost
 from confab.planner.timed.plan import schedule_of
 from confab.planner.validation import validate
 from confab.reasoner.limits import Deadline, OutOfTimeError, overtime, within
@@ -122,8 +122,7 @@ def solve(request: Request) -> Outcome:
             "this is a fault of the planner, not of the scene: please report it with the scene's files"
         )
     plan = outcome.plan
-    if any(one.price is not None or one.cost != 1.0 for one in request.problem.domain.behaviors.values()):
-        outcome = replace(outcome, cost=cost_of(request.problem, plan))
+    outcome = replace(outcome, cost=stated_cost(request.problem, plan))
     first = request.problem.domain.levels[0]
     if all(step.level == first for step in plan.steps):
         return outcome  # no run of lower-level steps to report

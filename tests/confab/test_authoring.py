@@ -16,6 +16,8 @@ from confab.reasoner.memory.links_file import memory_lines
 from confab.reasoner.validation.validate import validate
 from confab.scene import read
 
+GUESTS = Path(__file__).parent / "cases" / "guests.ttl"
+
 
 def test_a_new_domain_is_valid_and_has_a_plan(tmp_path: Path) -> None:
     files = new_domain("tearoom", tmp_path / "tearoom")

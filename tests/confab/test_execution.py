@@ -26,6 +26,8 @@ from confab.reasoner.validation.validate import validate
 from confab.reasoner.vocabulary import EPISODES, PROV
 from tests.ontology.faults import skeleton
 
+GUESTS = Path(__file__).parent / "cases" / "guests.ttl"
+
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 FIGURE_8 = ("after=28 cup2 LOCATION location8", "after=28 goal cup2 LOCATION location8")
 

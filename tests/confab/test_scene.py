@@ -10,6 +10,8 @@ from confab.interchange import read_plan
 from confab.planner.solve import Mode
 from confab.scene import described
 
+GUESTS = Path(__file__).parent / "cases" / "guests.ttl"
+
 
 @pytest.fixture(scope="module")
 def scene() -> confab.Scene:
@@ -55,10 +57,30 @@ def test_a_saved_plan_is_read_back_as_it_was(tmp_path: Path, scene: confab.Scene
     assert read_plan(path, scene.problem) == result.plan
 
 
+def test_a_result_that_is_read_has_the_cost_and_the_unmet_soft_goals_of_the_saved_result(tmp_path: Path) -> None:
+    scene = confab.load("wishes-small")
+    made = scene.plan()
+    read = scene.read_result(made.save(tmp_path / "plan.json"))
+    assert read.outcome.unmet == made.outcome.unmet != set()
+    assert read.outcome.cost == made.outcome.cost
+    assert read.outcome.penalty == made.outcome.penalty
+    assert read.outcome.total == made.outcome.total == 31
+    assert "leaves a soft goal unmet: store STOCK 0 (weight 8)" in str(read)
+    assert {"cost", "penalty", "forgone"} <= read.json().keys()
+    assert scene.read_result(scene.plan("store STOCK 0").plan, "store STOCK 0").outcome.penalty == 0
+
+
+def test_a_saved_plan_without_steps_is_read_and_executed(tmp_path: Path) -> None:
+    scene = confab.load(GUESTS).without_goal("guest1", "guest2 AT")
+    path = scene.plan().save(tmp_path / "plan.json")
+    assert read_plan(path, scene.problem).steps == ()
+    assert scene.execute(path).reached
+
+
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        ({"steps": []}, "holds no plan"),
+        ({}, "holds no plan"),
         ({"status": "unsolvable"}, "status is 'unsolvable'"),
         ({"steps": [{"behavior": "B1_MVOE", "arguments": []}]}, "did you mean 'B1_MOVE'"),
         ({"steps": [{"behavior": "B1_MOVE", "arguments": ["cup1"]}]}, "takes 2 arguments, got 1"),
