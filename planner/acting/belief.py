@@ -11,7 +11,7 @@ from confab.planner.acting.episode import Surprise
 from confab.planner.acting.failure_memory import Static, without_relations
 from confab.planner.acting.symbolic_world import met, with_individual
 from confab.planner.hierarchical.planner import Compiled, compiled
-from confab.planner.plan import Step
+from confab.planner.plan import Reason, Step
 from confab.planner.validation import followed
 from confab.reasoner.aggregates.totals import following
 from confab.reasoner.amounts import DECIMAL
@@ -33,6 +33,7 @@ from confab.reasoner.symbols import (
     ValueCondition,
     ValueEffect,
 )
+from confab.reasoner.timing import judged_by_events
 
 UNSEEN = "not seen"
 """The value of a symbol of which no value is perceived; no individual has this name."""
@@ -45,7 +46,9 @@ class Belief:
     `problem` contains the situation, the goal, and only the static facts and behaviours that aren't in doubt. `certain` is the same
     problem, but it also contains the static facts and behaviours in doubt. `obstacles` are discovered objects that can't be moved;
     behaviours that would move an obstacle are excluded from `problem` and from `certain`. `withdrawn` and `refuted` contain the
-    static facts and the behaviours in doubt. `unseen` are the symbols that the first observation didn't include.
+    static facts and the behaviours in doubt. `unseen` are the symbols that the first observation didn't include. `touched` are the
+    symbols with rest values that executed steps have changed, each with the number of the first of these steps. `unrestorable`
+    are those of them that can't be brought to rest, each with the reason.
     """
 
     problem: Problem
@@ -53,6 +56,8 @@ class Belief:
     refuted: dict[Refutation, None] = field(default_factory=dict)
     obstacles: dict[str, Discovery] = field(default_factory=dict)
     unseen: frozenset[Symbol] | None = None
+    touched: dict[Symbol, int] = field(default_factory=dict)
+    unrestorable: dict[Symbol, Reason] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.certain, self.unobstructed = self.problem, self.problem.domain
@@ -77,6 +82,46 @@ class Belief:
             if symbol.arguments[0] in there and _has_named_values(situations[symbol.situation])
         }
         return replace(self.problem, initial={**initial, **dict(sorted(lost.items()))}) if lost else self.problem
+
+    @property
+    def rests(self) -> dict[Symbol, str]:
+        """The rest values that executed steps have to restore, except those that can't be restored."""
+        return {symbol: rest for symbol, rest in self.restless.items() if symbol not in self.unrestorable}
+
+    @property
+    def pursued(self) -> Problem:
+        """The task whose goals include the rest values that executed steps have to restore."""
+        task, rests = self.task, self.rests
+        return replace(task, goal=dict(sorted({**rests, **task.goal}.items()))) if rests else task
+
+    @property
+    def restless(self) -> dict[Symbol, str]:
+        """The symbols that executed steps have changed and that have to be brought to rest, each with its rest value.
+
+        Left out are symbols that a goal releases, and symbols of which no value is perceived because their object is gone or at no
+        perceived place. If steps may overlap by need, a symbol may also have its initial value (docs/levels.md, "In time").
+        """
+        found, problem = dict[Symbol, str](), self.task
+        for symbol in sorted(self.touched):
+            rest = problem.domain.situations[symbol.situation].rest or FALSE
+            value = problem.initial.get(symbol, FALSE if self.boolean(symbol) else rest)
+            back = judged_by_events(problem) and value == self.certain.initial.get(symbol, FALSE)
+            if value != rest and not back and not problem.releases(symbol):
+                found[symbol] = rest
+        return found
+
+    def note_changes(self, number: int, before: State, values: State) -> None:
+        """Record the symbols with rest values that step `number` of the executed plan, begun in the situation `before`, changes.
+
+        `values` are the new values of symbols after a primitive of this step. A change inside of a step counts only if it lasts.
+        """
+        for symbol, value in values.items():
+            if self.problem.domain.situations[symbol.situation].rest is None:
+                continue
+            if value != before.get(symbol, FALSE):
+                self.touched.setdefault(symbol, number)
+            elif self.touched.get(symbol) == number:
+                del self.touched[symbol]
 
     @property
     def state(self) -> dict[Symbol, str]:

@@ -3,8 +3,9 @@
 `belief` is the situation as last observed, with the current goal and the doubts that failures have raised. `agenda` contains
 the steps still to be done; the first step may be partly done. `expected` is the situation that the next observation should
 show. `aside` contains goals that are impossible in the present situation; they are pursued again after an unexpected
-observation. `put_off` contains goals that are unreachable while facts are in doubt; they are tried again when all other goals
-are done.
+observation or a change of the goals. `put_off` contains goals that are unreachable while facts are in doubt; they are tried again
+when all other goals are done. Beside the goals, the episode pursues the rest values of the symbols that executed steps have changed
+(`Belief.restless`), except those that can't be restored in the present situation (`Belief.unrestorable`).
 
 Rule 1: a primitive is begun only if its precondition holds in the last observation. Rule 2: the world is observed after
 every primitive; an unexpected observation triggers a check of the remaining plan. Rule 3: an unreachable goal is
@@ -40,7 +41,7 @@ from confab.planner.acting.failure_memory import Caution, refuted_by, relied_on_
 from confab.planner.acting.record import Record
 from confab.planner.acting.repair import difference, repair_or_replan, replan, vanished
 from confab.planner.acting.retries import DEFAULT, Retries, RetryPolicy
-from confab.planner.acting.unreached import blamed, blocked, with_discoveries
+from confab.planner.acting.unreached import blamed, blocked, unrestored, with_discoveries
 from confab.planner.acting.world import INTERRUPTED, WITHOUT_EFFECT, Guarded, Verdict, World, WorldError, WorldReport
 from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, renumbered
@@ -169,19 +170,26 @@ class _RunningEpisode:
     def finish(self) -> None:
         """Handle an empty agenda: check the agenda again, resume a postponed goal, or end the episode."""
         record = self.record
-        if missing := open_goals(self.belief.problem):
+        if missing := open_goals(self.belief.pursued):
             self.request_replan(f"{missing[0]} doesn't hold yet")
             return
-        if self.goals.put_off and self.try_anew("all other goals are handled"):
+        unsure = bool(self.goals.put_off or (self.belief.doubted and self.belief.restless))
+        if unsure and self.try_anew("all other goals are handled"):
             return
-        if self.goals.put_off:
+        if unsure:
             record.status = End.GAVE_UP
-        for reason in (*self.goals.reasons(), *self.missed_times()):
+        for reason in (*self.unreached(), *self.missed_times()):
             record.reason(reason)
         self.going = False
         if record.reasons and record.status is End.REACHED:
             record.status = End.IMPOSSIBLE
         self.say("over", text=record.status.value)
+
+    def unreached(self) -> Iterator[Reason]:
+        """Yield the reasons for dropped and postponed goals, and for symbols that can't be brought to rest."""
+        yield from self.goals.reasons()
+        left = self.belief.restless
+        yield from (reason for symbol, reason in self.belief.unrestorable.items() if symbol in left)
 
     def missed_times(self) -> Iterator[Reason]:
         """Yield a reason for each goal that was reached after its deadline, and for each step outside of a window or fixed time."""
@@ -260,7 +268,7 @@ class _RunningEpisode:
         chain, record = next(chains_of(self.agenda.steps)), self.record
         step, before = chain[-1], self.belief.problem.initial
         changes = [Fact(s, v) for s, v in sorted(expected.items()) if before.get(s) != v]
-        self.begin(chain, before)
+        start = self.begin(chain, before)
         self.say("begin", step, changes)
         begin = self.world.seconds
         verdict = self.world.execute(step)
@@ -271,6 +279,9 @@ class _RunningEpisode:
             verdict = WorldReport(False, WITHOUT_EFFECT, step.arguments, text)
         done = is_done(verdict, changes, seen)
         surprises = self.look(expected if done else dict(before), seen)
+        now = self.belief.problem.initial
+        made = [fact.symbol for fact in changes if now.get(fact.symbol) != before.get(fact.symbol)]
+        self.belief.note_changes(step.path[0], start, {symbol: now.get(symbol, FALSE) for symbol in made})
         relied_on = tuple(relied_on_by(self.belief.problem, chain))
         record.events.append(
             ExecutedPrimitive(step, begin, self.world.seconds, verdict.ok, verdict.code, surprises, relied_on)
@@ -285,10 +296,11 @@ class _RunningEpisode:
             self.give_up(Reason(f"stopped at the limit of {self.retries.most} primitives"))
         return chain, before, verdict
 
-    def begin(self, chain: tuple[Step, ...], before: State) -> None:
-        """Record that the ancestors of a primitive have begun."""
+    def begin(self, chain: tuple[Step, ...], before: State) -> State:
+        """Record that the ancestors of a primitive have begun; return the situation before the first of the steps."""
         for above in chain[:-1]:
             self.agenda.begun.setdefault(above.path, before)
+        return self.agenda.begun.get(chain[0].path, before)
 
     def remaining(self) -> Remaining | None:
         """Return the dispatch of the remaining primitives; without a schedule, one primitive at a time is executed from now on."""
@@ -331,19 +343,21 @@ class _RunningEpisode:
         seen, every = self.world.observe(), {chain[-1].path: chain for chain in chains_of(self.agenda.steps)}
         chains = [every[paths[slot.position]] for slot, _ in ended]
         course = StepSimulation(self.belief.task, [chain[-1] for chain in chains])
+        starts = dict[int, State]()
         finished, failed = set[tuple[int, ...]](), list[tuple[tuple[Step, ...], State, Verdict]]()
         for number, is_end in in_order([slot for slot, _ in ended]):
             chain, step, (slot, verdict) = chains[number], chains[number][-1], ended[number]
             with suppress(InapplicableError):  # the observation shows what has happened instead
                 if not is_end:
                     before: State = _perceived(course.facts.state())
-                    self.begin(chain, before)
+                    starts[number] = self.begin(chain, before)
                     relied_on = tuple(relied_on_by(self.belief.problem, chain))
                     record.events.append(
                         ExecutedPrimitive(step, slot.begin, slot.end, verdict.ok, verdict.code, (), relied_on)
                     )
                     failed += [] if verdict.ok else [(chain, before, verdict)]
                     course.begin(number)
+                    self.belief.note_changes(step.path[0], starts[number], course.changes(number, "begin"))
                     record.course += changed(course.changes(number, "begin"), slot.begin)
                     continue
                 changes = [Fact(*one) for one in course.changes(number, "begin", "middle").items()]
@@ -352,7 +366,9 @@ class _RunningEpisode:
                     record.done.update((above.path, above) for above in chain)
                     finished.add(step.path)
                     course.end(number)
-                    record.course += changed(course.changes(number, "middle", "end"), slot.end)
+                    ending = course.changes(number, "middle", "end")
+                    self.belief.note_changes(step.path[0], starts[number], ending)
+                    record.course += changed(ending, slot.end)
         record.course.sort(key=lambda change: change.seconds)
         self.agenda.steps = without(self.agenda.steps, finished)
         state = _perceived(course.facts.state())
@@ -448,6 +464,7 @@ class _RunningEpisode:
             self.belief.add(intervention.individual, intervention.kind)
         if goal != self.belief.problem.goal:
             self.belief.want(goal)
+            self.want_again(self.goals.aside)
             self.request_replan("the goals have changed")
         self.say("intervention", text=intervention.text)
 
@@ -473,7 +490,7 @@ class _RunningEpisode:
             self.want_again(self.goals.aside)
         self.set_aside_the_vanished()
         counted = len(record.events), len(record.interventions), len(record.failures), len(record.discovered)
-        doubts = len(belief.withdrawn), len(belief.refuted), self.retries.rounds
+        doubts = len(belief.withdrawn), len(belief.refuted), len(belief.unrestorable), self.retries.rounds
         standing = (*counted, *doubts, record.status, *belief.problem.goal)
         self.retries.pondered[standing] += 1
         if self.retries.pondered[standing] > self.retries.policy.rounds:
@@ -484,15 +501,16 @@ class _RunningEpisode:
         limits, old = self.retries.policy.planning, self.agenda.steps
         end = limits.end()
         expected = {s: v for s, v in {**belief.state, **self.missed}.items() if v is not None}
-        planned = replace(self.agenda.planned_for, initial=expected)
+        known = self.agenda.planned_for
+        planned = replace(known, initial=expected, goal={**belief.rests, **known.goal})
         begun = bool(old) and old[0].path in self.agenda.begun
         found = repair_or_replan(
-            belief.task, old, planned, self.planner, belief.using, self.agenda.sound, limits, begun
+            belief.pursued, old, planned, self.planner, belief.using, self.agenda.sound, limits, begun
         )
         steps = found.steps
         seconds = perf_counter() - begin
         record.seconds["repairing"] += seconds
-        self.agenda.planned_for, self.agenda.sound, self.missed = belief.task, True, {}
+        self.agenda.planned_for, self.agenda.sound, self.missed = belief.problem, True, {}
         if steps is None:
             self.on_no_plan(found.outcome, limits.until(end))
             return
@@ -512,7 +530,8 @@ class _RunningEpisode:
             self.belief.want({s: v for s, v in goal.items() if s not in impossible})
 
     def want_again(self, goals: dict[Symbol, tuple[str, Reason]]) -> None:
-        """Resume goals that were dropped or postponed."""
+        """Resume goals that were dropped or postponed, and all rest values."""
+        self.belief.unrestorable.clear()
         if goals:
             self.belief.want({**self.belief.goal, **{symbol: value for symbol, (value, _) in goals.items()}})
             goals.clear()
@@ -533,15 +552,11 @@ class _RunningEpisode:
         unsolvable, end = outcome is not None and outcome.status is Status.UNSOLVABLE, limits.end()
         if unsolvable and self.make_room():
             return
-        hopeless: dict[Symbol, Reason] = {}
-        for fact in open_goals(belief.problem) if unsolvable else ():
-            alone = replace(belief.task, goal={fact.symbol: fact.value})
-            steps, single = replan(alone, None, belief.using, limits.until(end))
-            if steps is None and single.status is Status.UNSOLVABLE and single.reason is not None:
-                hopeless[fact.symbol] = blocked(belief, fact, limits.until(end)) or with_discoveries(
-                    belief, self.record, fact, single.reason
-                )
-        if hopeless and belief.doubted:
+        rests, hopeless = self.hopeless(limits.until(end)) if unsolvable else ({}, {})
+        if rests:
+            belief.unrestorable |= rests
+            self.request_replan("rest values can't be restored")
+        elif hopeless and belief.doubted:
             goal = belief.goal
             self.goals.put_off |= {
                 symbol: (goal[symbol], blamed(self.record, symbol, goal[symbol])) for symbol in hopeless
@@ -553,6 +568,32 @@ class _RunningEpisode:
             self.request_replan("unreachable goals are dropped")
         elif not (belief.doubted and self.try_anew("no alternative is left")):
             self.give_up(reason, End.IMPOSSIBLE if unsolvable and not belief.doubted else End.GAVE_UP)
+
+    def hopeless(self, limits: Limits) -> tuple[dict[Symbol, Reason], dict[Symbol, Reason]]:
+        """Return the symbols that can't be brought to rest or, if there are none, the unreachable goals, each with the reason.
+
+        Each goal is tried alone, together with the rest values; the other goals still release their symbols from the rest values.
+        """
+        belief, known, rests, end = self.belief, self.belief.problem, self.belief.rests, limits.end()
+        free = [symbol for symbol in {**known.goal, **known.weights} if known.may_leave_rest(symbol)]
+
+        def why(goal: dict[Symbol, str]) -> Reason | None:
+            weights = {symbol: Fraction(0) for symbol in free if symbol not in goal}
+            alone = replace(belief.task, goal=goal, weights=weights)
+            steps, single = replan(alone, None, belief.using, limits.until(end))
+            return single.reason if steps is None and single.status is Status.UNSOLVABLE else None
+
+        if rests and (together := why(rests)):
+            each = {symbol: reason for symbol, rest in rests.items() if (reason := why({symbol: rest}))}
+            each = each or dict.fromkeys(rests, together)
+            return {s: unrestored(belief, self.record, Fact(s, rests[s]), reason) for s, reason in each.items()}, {}
+        found = dict[Symbol, Reason]()
+        for fact in open_goals(known):
+            if (reason := why({**rests, fact.symbol: fact.value})) is not None:
+                found[fact.symbol] = blocked(belief, fact, limits.until(end)) or with_discoveries(
+                    belief, self.record, fact, reason
+                )
+        return {}, found
 
     def make_room(self) -> bool:
         """Ask the world once for free spots outside the scene's places; return whether there are any."""
@@ -572,7 +613,7 @@ class _RunningEpisode:
         if not self.belief.problem.goal and self.record.status is not End.REACHED:
             self.going = False
         self.record.status = status
-        for earlier in self.goals.reasons():
+        for earlier in self.unreached():
             self.record.reason(earlier)
         self.record.reason(reason)
         self.belief.want({})

@@ -33,6 +33,12 @@ def with_discoveries(belief: Belief, record: Record, fact: Fact, reason: Reason)
     return replace(reason, text="; ".join((*found, reason.text))) if found else reason
 
 
+def unrestored(belief: Belief, record: Record, rest: Fact, reason: Reason) -> Reason:
+    """Return the reason why a symbol that the steps have changed can't be brought to rest: a failure, or else `reason`."""
+    why = blamed(record, rest.symbol, rest.value) if belief.doubted else reason
+    return replace(why, text=f"the rest value {rest} can't be restored: {why.text}")
+
+
 def blamed(record: Record, symbol: Symbol, value: str) -> Reason:
     """Return the reason for dropping a goal: the last failure that concerns the goal, otherwise the last failure of the episode."""
     concerned = {*symbol.arguments, value}
