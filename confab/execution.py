@@ -8,7 +8,7 @@ from fractions import Fraction
 from functools import partial
 from pathlib import Path
 from random import Random
-from typing import TYPE_CHECKING, TypedDict
+from typing import TYPE_CHECKING, Any, TypedDict
 
 from confab.accepting import (
     AnyPlan,
@@ -26,7 +26,7 @@ from confab.formats import EpisodeJson
 from confab.interchange import episode_json
 from confab.intervening import parse_interventions
 from confab.planner.acting.dispatching import Concurrency
-from confab.planner.acting.episode import End, Episode, Event, Intervention, InterventionKind, holds_from, situation
+from confab.planner.acting.episode import End, Episode, Event, Intervention, InterventionKind, situation
 from confab.planner.acting.executive import act
 from confab.planner.acting.failure_memory import Caution
 from confab.planner.acting.retries import RetryPolicy
@@ -35,7 +35,6 @@ from confab.planner.acting.world import World
 from confab.planner.finding import numbers
 from confab.planner.plan import Plan, Planner, SoftGoal
 from confab.planner.solve import DEFAULT_MODE, Mode
-from confab.planner.validation import open_goals, unmet_goals
 from confab.reasoner.aggregates.totals import exceptions
 from confab.reasoner.amounts import written
 from confab.reasoner.graph.knowledge import KnowledgeError
@@ -46,7 +45,7 @@ from confab.reasoner.names import RightNames, right_names
 from confab.reasoner.possible import violated
 from confab.reasoner.problem import Problem
 from confab.reasoner.reading.goals import some_of, with_goals
-from confab.reasoner.symbols import Fact, Symbol, Times
+from confab.reasoner.symbols import Symbol
 from confab.timing import has_times
 
 if TYPE_CHECKING:
@@ -109,16 +108,8 @@ class Execution(metaclass=RightNames):
 
     @property
     def soft_goals(self) -> tuple[SoftGoal, ...]:
-        """The soft goals of the task, the heaviest first, without goals that an intervention or `goals` dropped or replaced."""
-        problem, episode = self.scene.problem, self.episode
-        dropped = {intervention.symbol for intervention, _ in episode.interventions}
-        weighted = ((s, v) for s, v in problem.goal.items() if s in problem.weights and s not in dropped)
-        soft = {s: v for s, v in weighted if episode.goal.get(s, v) == v}
-        unmet = {fact.symbol for fact in open_goals(replace(problem, initial=episode.observed, goal=soft))}
-        deadlines = ((goal, by) for goal, by in (problem.times or Times()).deadlines.items() if goal in soft)
-        unmet |= {goal for goal, by in deadlines if holds_from(problem, goal, episode.initial, episode.course) > by}
-        found = [SoftGoal(Fact(s, value), problem.weights[s], s not in unmet) for s, value in soft.items()]
-        return tuple(sorted(found, key=lambda one: (-one.weight, one.fact.symbol)))
+        """The goals that were soft until the end, the heaviest first, and whether they hold."""
+        return self.episode.soft_goals
 
     def json(self) -> EpisodeJson:
         """Return the episode as JSON data (docs/execution.md)."""
@@ -258,8 +249,6 @@ def carry_out(
     scene.settle()
     problem = _whole_problem(scene, plan, several(goals))
     begun = None if plan is None else plan_of(plan, problem)
-    if begun is not None and problem.weights:  # the plan determines the soft goals to reach
-        problem = problem.only(problem.weights.keys() & unmet_goals(problem, begun))
     if isinstance(memory, str | Path):
         from confab.memory import Memory
 
@@ -277,23 +266,24 @@ def carry_out(
     texts = several(interventions)
     check_seconds("time_limit", time_limit)
     with within(time_limit), spectator(watch, observer) as heard:
-        schedule = getattr(plan, "timed", None)
+        schedule: TimedPlan | None = _own(scene, plan, "timed")
         return execute(scene, problem, begun, texts, world, planner, seed, heard, schedule=schedule, **options)
 
 
 def _whole_problem(scene: Known, plan: AnyPlan | None, goals: Sequence[str]) -> Problem:
-    """Return the problem of the whole scene, with the given goals or, if `plan` is a result, with the goals of the result.
+    """Return the problem of the whole scene with the given goals; if `plan` is a result of the scene, also with its goals.
 
-    The part of the scene that was read for the first plan may be too small for plans that are made during execution. A result that
-    leaves all soft goals unmet may have no goals.
+    The part of the scene that was read for the first plan may be too small for plans that are made during execution.
     """
-    whole = getattr(plan, "in_whole_scene", None)
-    if whole is not None:
-        result: Problem = whole().problem
-        return result
-    problem = with_goals(scene.reading.problem, goals)
+    own: Problem | None = _own(scene, plan, "task")
+    problem = with_goals(own or scene.reading.problem, goals)
     check_goal(scene.iri, problem)
     return problem
+
+
+def _own(scene: Known, plan: AnyPlan | None, name: str) -> Any:
+    """Return an attribute of a result if it is a result of the scene; return None for any other plan."""
+    return getattr(plan, name, None) if getattr(plan, "scene", None) is scene else None
 
 
 def planner_of(mode: Mode, memory: Links | None = None) -> Planner | None:

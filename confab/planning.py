@@ -234,6 +234,15 @@ class Result(metaclass=RightNames):
         return self.outcome.plan
 
     @property
+    def task(self) -> Problem:
+        """The task in the whole scene: all goals of the call, the observed facts, and the measured durations."""
+        stated, own = with_goals(self.scene.reading.problem, self.goals), self.problem
+        times = own.times and replace(
+            stated.times or own.times, measured=own.times.measured, of_actors=own.times.of_actors
+        )
+        return replace(stated, initial=own.initial if self.part is None else stated.initial, times=times)
+
+    @property
     def soft_goals(self) -> tuple[SoftGoal, ...]:
         """The soft goals of the task, the heaviest first."""
         task, met = with_goals((self.part or self.scene.reading).problem, self.goals), self.problem.goal

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -25,11 +26,11 @@ from confab.planner.acting.episode import (
     situation,
 )
 from confab.planner.acting.symbolic_world import with_individual
-from confab.planner.plan import Plan, Reason, Step
+from confab.planner.plan import Plan, Reason, SoftGoal, Step
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.problem import Problem
 from confab.reasoner.reading.goals import parse_fact
-from confab.reasoner.symbols import Symbol
+from confab.reasoner.symbols import Fact, Symbol
 
 if TYPE_CHECKING:
     from confab.execution import Execution
@@ -89,6 +90,10 @@ def read_episode(scene: Known, path: Path) -> Execution:
                 for one in data.get("discovered", [])
             ),
             measured=data.get("measured") is True,
+            soft_goals=tuple(
+                SoftGoal(Fact(*parse_fact(problem, one["goal"])), Fraction(str(one["weight"])), one["met"] is True)
+                for one in data.get("soft_goals", [])
+            ),
         )
     return Execution(scene, episode)
 

@@ -113,13 +113,14 @@ class Scene(Known):
     ) -> Report:
         """Verify a plan, or the plan of a result, in PyBullet (`confab.physics.verify`).
 
-        Without the argument `plan`, a new plan is made and verified.
+        Without the argument `plan`, a new plan is made and verified. The goals are those of this scene; a result of this scene has
+        its own goals.
         """
         from confab.physics import verify
 
         self.settle()
         plan = self.plan() if plan is None else plan
-        if isinstance(plan, Result):
+        if isinstance(plan, Result) and plan.scene is self:
             options.setdefault("goal", plan.problem.goal)
         return verify(self, plan_of(plan, self.problem), rollouts, seed, **options)
 
@@ -139,9 +140,12 @@ class Scene(Known):
     ) -> Execution:
         """Execute the task in a closed loop of action and observation (`confab.execution.execute`).
 
-        The first plan is `plan`: a plan, a result, or the name of a plan file. During the execution, new plans are made with
-        `memory`. `Memory.live` learns from the returned execution. With `watch`, a notebook or a terminal shows the execution.
-        The function `observer` is called with each event. After `time_limit` seconds the execution gives up.
+        The first plan is `plan`: a plan, a result, or the name of a plan file. The facts and the goals are those of this scene; a
+        result of this scene has its own facts and goals. Each of the `goals` replaces the goal for the same symbol. The soft goals
+        that the plan meets are pursued as long as they cost less than their weights, and the hard goals can be reached. During
+        the execution, new plans are made with `memory`. `Memory.live` learns from the returned execution. With `watch`, a notebook
+        or a terminal shows the execution. The function `observer` is called with each event. After `time_limit` seconds the
+        execution gives up.
 
         Examples
         --------

@@ -180,6 +180,7 @@ def astray(graph: Mapping[str, set[str]]) -> list[str]:
                 room,
                 "plan",
                 "plan_costs",
+                "preferences",
                 "validation",
                 "checked_amounts",
                 "checked_conditions",

@@ -30,6 +30,7 @@ from confab.reasoner.symbols import (
     SituationType,
     State,
     Symbol,
+    Times,
     ValueCondition,
     ValueEffect,
 )
@@ -61,6 +62,7 @@ class Belief:
 
     def __post_init__(self) -> None:
         self.certain, self.unobstructed = self.problem, self.problem.domain
+        self.times = self.problem.times or Times()
 
     @cached_property
     def using(self) -> Compiled:
@@ -139,8 +141,10 @@ class Belief:
         return bool(self.withdrawn or self.refuted)
 
     def want(self, goal: Mapping[Symbol, str]) -> None:
-        """Replace the goal."""
-        self.problem = replace(self.problem, goal=dict(sorted(goal.items())))
+        """Replace the goal; only wanted goals have deadlines."""
+        by = {symbol: seconds for symbol, seconds in self.times.deadlines.items() if symbol in goal}
+        times = self.problem.times and replace(self.problem.times, deadlines=by)
+        self.problem = replace(self.problem, goal=dict(sorted(goal.items())), times=times)
 
     def boolean(self, symbol: Symbol) -> bool:
         """Return whether a symbol is boolean; a boolean symbol that isn't observed is false."""

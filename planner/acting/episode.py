@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from confab.planner.acting.discovery import Discovery
-from confab.planner.plan import Plan, Reason, Step
+from confab.planner.plan import Plan, Reason, SoftGoal, Step
 from confab.reasoner.amounts import meets
 from confab.reasoner.derivation import deciding
 from confab.reasoner.names import brief, known_as
@@ -221,6 +221,8 @@ class Episode:
         Individuals that the world found and the scene doesn't contain, with the time of discovery.
     measured : bool
         Whether the world's clock is measured; the durations of a symbolic world are assumed.
+    soft_goals : tuple of SoftGoal
+        The goals that a plan may leave unmet and that no intervention dropped or replaced, the heaviest first.
     """
 
     scene: str
@@ -241,6 +243,7 @@ class Episode:
     refuted: tuple[Refutation, ...] = ()
     discovered: tuple[tuple[Discovery, float], ...] = ()
     measured: bool = True
+    soft_goals: tuple[SoftGoal, ...] = ()
 
 
 @dataclass(frozen=True)

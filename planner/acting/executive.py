@@ -39,14 +39,14 @@ from confab.planner.acting.episode import (
 )
 from confab.planner.acting.failure_memory import Caution, refuted_by, relied_on_by
 from confab.planner.acting.record import Record
-from confab.planner.acting.repair import difference, repair_or_replan, replan, vanished
+from confab.planner.acting.repair import RepairResult, chosen, difference, repair_or_replan, replan, vanished
 from confab.planner.acting.retries import DEFAULT, Retries, RetryPolicy
 from confab.planner.acting.unreached import blamed, blocked, unrestored, with_discoveries
 from confab.planner.acting.world import INTERRUPTED, WITHOUT_EFFECT, Guarded, Verdict, World, WorldError, WorldReport
 from confab.planner.hierarchical.planner import plan as hierarchical_plan
-from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, renumbered
+from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, SoftGoal, Status, Step, renumbered
 from confab.planner.timed.activities import InapplicableError, StepSimulation
-from confab.planner.validation import followed, open_goals
+from confab.planner.validation import followed, open_goals, unmet_goals
 from confab.reasoner.derivation import said_by
 from confab.reasoner.limits import LimitError, check, current
 from confab.reasoner.problem import Problem
@@ -70,7 +70,7 @@ def act(
     Parameters
     ----------
     problem : Problem
-        The initial situation, and the goal.
+        The initial situation, and the goals. Soft goals are chosen with each plan, from those that the first plan meets.
     world : World
         A simulation, a robot or a `confab.planner.acting.symbolic_world.SymbolicWorld`: any object with `observe` and `execute`.
     plan : Plan, optional
@@ -89,14 +89,19 @@ def act(
     """
     if caution is not None and plan is None:
         problem = caution.applied(problem, planner or hierarchical_plan, retry_policy.planning)
+    goal = problem.goal
+    soft = {s: SoftGoal(Fact(s, goal[s]), weight, False) for s, weight in problem.weights.items() if s in goal}
+    unmet = frozenset[Symbol]() if plan is None or not soft else unmet_goals(problem, plan)
     run = _RunningEpisode(
-        Belief(problem),
+        Belief(replace(problem, weights={})),
         Guarded(world),
         list(interventions),
         planner,
         Retries(retry_policy),
         observer,
         together,
+        soft,
+        unmet & soft.keys(),
     )
     try:
         run.look(run.belief.state)
@@ -136,6 +141,8 @@ class _RunningEpisode:
     retries: Retries
     observer: Callable[[Event], None] | None
     together: Concurrency | None
+    soft: dict[Symbol, SoftGoal]  # the soft goals of the task
+    left: frozenset[Symbol]  # the soft goals that the given plan leaves unmet
     going: bool = True
     goals: Postponed = field(default_factory=Postponed)
     requested: str = ""  # the reason for checking the agenda, if a check is requested
@@ -153,14 +160,22 @@ class _RunningEpisode:
         record.initial = self.belief.state
         record.course.clear()  # the facts seen so far are the initial situation
         self.world.announce(tuple(i for i in self.waiting if i.at is not None))
+        self.want_soft_goals()
         begun, outcome, limits = plan, None, self.retries.policy.planning
         if begun is None:
             self.requested = ""
             self.set_aside_the_vanished()
             begin = perf_counter()
-            steps, outcome = replan(self.belief.problem, self.planner, self.belief.using, limits)
+
+            def search() -> RepairResult:
+                steps, outcome = replan(self.belief.problem, self.planner, self.belief.using, limits.until(end))
+                return RepairResult("replan", steps, 0.0, outcome)
+
+            end = limits.end()
+            found = self.choose(search)
+            outcome = found.outcome
             record.seconds["planning"] += perf_counter() - begin
-            begun = Plan(renumbered(steps or ()))
+            begun = Plan(renumbered(found.steps or ()))
         self.agenda.steps, record.planned, self.agenda.planned_for = begun.steps, begun, self.belief.problem
         self.retries.most = self.retries.policy.primitives * max(len(begun.primitives), 20)
         if outcome is not None and outcome.plan is None:
@@ -174,7 +189,8 @@ class _RunningEpisode:
             self.request_replan(f"{missing[0]} doesn't hold yet")
             return
         unsure = bool(self.goals.put_off or (self.belief.doubted and self.belief.restless))
-        if unsure and self.try_anew("all other goals are handled"):
+        doubtful = self.belief.doubted and not self.eligible.keys() <= self.belief.goal.keys()
+        if (unsure or doubtful) and self.try_anew("all other goals are handled"):
             return
         if unsure:
             record.status = End.GAVE_UP
@@ -192,12 +208,12 @@ class _RunningEpisode:
         yield from (reason for symbol, reason in self.belief.unrestorable.items() if symbol in left)
 
     def missed_times(self) -> Iterator[Reason]:
-        """Yield a reason for each goal that was reached after its deadline, and for each step outside of a window or fixed time."""
+        """Yield a reason for each hard goal that was reached after its deadline, and for each step outside of its times."""
         problem = self.belief.problem
         times = problem.times or Times()
         for goal, by in times.deadlines.items():
             if (
-                goal in problem.goal
+                goal in problem.goal.keys() - self.soft.keys()
                 and (reached := holds_from(problem, goal, self.record.initial, self.record.course)) > by
             ):
                 known = f"; this was known at {float(self.late[goal]):g} s" if goal in self.late else ""
@@ -225,7 +241,18 @@ class _RunningEpisode:
         clock = 0.0
         with suppress(WorldError):
             clock = self.world.seconds
-        return self.record.episode(self.belief.problem, clock, tuple(self.waiting), self.world.measured)
+        soft = tuple(self.soft_goals())
+        return self.record.episode(self.belief.problem, clock, tuple(self.waiting), self.world.measured, soft)
+
+    def soft_goals(self) -> Iterator[SoftGoal]:
+        """Yield the soft goals, the heaviest first, with what holds in the end; a goal that is reached late is unmet."""
+        task, deadlines = self.belief.problem, self.belief.times.deadlines
+        wanted = replace(task, goal={symbol: one.fact.value for symbol, one in self.soft.items()})
+        unmet = {fact.symbol for fact in open_goals(wanted)}
+        for symbol, one in sorted(self.soft.items(), key=lambda each: (-each[1].weight, each[0])):
+            by = deadlines.get(symbol)
+            late = by is not None and holds_from(wanted, symbol, self.record.initial, self.record.course) > by
+            yield one._replace(met=symbol not in unmet and not late)
 
     def whole(self) -> Plan:
         """Return the tree of the executed and the remaining steps."""
@@ -456,10 +483,10 @@ class _RunningEpisode:
         goal = self.belief.goal
         if intervention.change is InterventionKind.GOAL:
             goal.update((fact.symbol, fact.value) for fact in intervention.facts)
-            self.goals.forget(fact.symbol for fact in intervention.facts)
+            self.forget(fact.symbol for fact in intervention.facts)
         elif intervention.change is InterventionKind.DROP_GOAL and intervention.symbol is not None:
             goal.pop(intervention.symbol, None)
-            self.goals.forget([intervention.symbol])
+            self.forget([intervention.symbol])
         elif intervention.change is InterventionKind.ADD:
             self.belief.add(intervention.individual, intervention.kind)
         if goal != self.belief.problem.goal:
@@ -467,6 +494,12 @@ class _RunningEpisode:
             self.want_again(self.goals.aside)
             self.request_replan("the goals have changed")
         self.say("intervention", text=intervention.text)
+
+    def forget(self, symbols: Iterable[Symbol]) -> None:
+        """Forget the soft, the dropped and the postponed goals of symbols whose goals an intervention drops or replaces."""
+        for symbol in (gone := list(symbols)):
+            self.soft.pop(symbol, None)
+        self.goals.forget(gone)
 
     def request_replan(self, why: str, surprises: Sequence[Surprise] = ()) -> None:
         """Request that the agenda is checked again, for a reason or because of surprises."""
@@ -484,10 +517,11 @@ class _RunningEpisode:
     # --------------------------------------------------------------------------------------------------- repairing
 
     def reconsider(self) -> None:
-        """Repair the plan, or replan; drop unreachable goals."""
+        """Repair the plan, or replan; choose among the soft goals, and drop unreachable goals."""
         why, self.requested, belief, record = self.requested, "", self.belief, self.record
         if self.missed:
             self.want_again(self.goals.aside)
+        self.want_soft_goals()
         self.set_aside_the_vanished()
         counted = len(record.events), len(record.interventions), len(record.failures), len(record.discovered)
         doubts = len(belief.withdrawn), len(belief.refuted), len(belief.unrestorable), self.retries.rounds
@@ -504,9 +538,12 @@ class _RunningEpisode:
         known = self.agenda.planned_for
         planned = replace(known, initial=expected, goal={**belief.rests, **known.goal})
         begun = bool(old) and old[0].path in self.agenda.begun
-        found = repair_or_replan(
-            belief.pursued, old, planned, self.planner, belief.using, self.agenda.sound, limits, begun
-        )
+
+        def search() -> RepairResult:
+            left, sound = limits.until(end), self.agenda.sound
+            return repair_or_replan(belief.pursued, old, planned, self.planner, belief.using, sound, left, begun)
+
+        found = self.choose(search)
         steps = found.steps
         seconds = perf_counter() - begin
         record.seconds["repairing"] += seconds
@@ -522,11 +559,39 @@ class _RunningEpisode:
             record.replans.append(change)
             self.say(found.kind, text=why)
 
+    @property
+    def eligible(self) -> dict[Symbol, str]:
+        """The soft goals that a plan may be made for: those that the first plan meets, but none if a hard goal is given up."""
+        if self.goals.aside or self.goals.put_off or self.record.status is not End.REACHED:
+            return {}
+        return {symbol: one.fact.value for symbol, one in self.soft.items() if symbol not in self.left}
+
+    def want_soft_goals(self) -> None:
+        """Want all eligible soft goals; `choose` then drops those that aren't worth their price."""
+        hard = {symbol: value for symbol, value in self.belief.goal.items() if symbol not in self.soft}
+        self.belief.want(hard | self.eligible)
+
+    def choose(self, search: Callable[[], RepairResult]) -> RepairResult:
+        """Search for steps for the hard goals and the soft goals that are worth their price; then only these goals are wanted."""
+        if self.goals.aside:
+            self.want_soft_goals()
+        weights = {symbol: one.weight for symbol, one in self.soft.items() if symbol in self.belief.goal}
+        if not weights:
+            return search()
+
+        def searched(choice: Problem) -> RepairResult:
+            self.belief.want(choice.goal)  # the rest values to restore depend on the goals
+            return search()
+
+        task, found = chosen(replace(self.belief.task, weights=weights), searched)
+        self.belief.want(task.goal)
+        return found
+
     def set_aside(self, impossible: Mapping[Symbol, Reason]) -> None:
-        """Drop an impossible goal, and record the reason."""
+        """Drop impossible goals, and record the reasons for hard goals."""
         if impossible:
             goal = self.belief.goal
-            self.goals.aside |= {symbol: (goal[symbol], reason) for symbol, reason in impossible.items()}
+            self.goals.aside |= {s: (goal[s], reason) for s, reason in impossible.items() if s not in self.soft}
             self.belief.want({s: v for s, v in goal.items() if s not in impossible})
 
     def want_again(self, goals: dict[Symbol, tuple[str, Reason]]) -> None:

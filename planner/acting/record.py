@@ -16,7 +16,7 @@ from confab.planner.acting.episode import (
     Replan,
     changes,
 )
-from confab.planner.plan import Plan, Reason, Step
+from confab.planner.plan import Plan, Reason, SoftGoal, Step
 from confab.reasoner.problem import Problem
 from confab.reasoner.refutations import Refutation
 from confab.reasoner.symbols import State
@@ -54,7 +54,14 @@ class Record:
         if reason not in self.reasons:
             self.reasons.append(reason)
 
-    def episode(self, task: Problem, clock: float, missed: tuple[Intervention, ...], measured: bool) -> Episode:
+    def episode(
+        self,
+        task: Problem,
+        clock: float,
+        missed: tuple[Intervention, ...],
+        measured: bool,
+        soft_goals: tuple[SoftGoal, ...] = (),
+    ) -> Episode:
         """Return the recorded episode with the final task; `measured` states whether the clock is measured."""
         return Episode(
             task.scene,
@@ -75,4 +82,5 @@ class Record:
             tuple(self.refuted),
             tuple(self.discovered),
             measured,
+            soft_goals,
         )

@@ -25,6 +25,7 @@ from confab.planner.hierarchical.search_budget import ONE_STEP
 from confab.planner.hierarchical.unsolvability import impossible
 from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, Step, UnsolvableError, renumbered
 from confab.planner.plan_costs import cost_of, costs_of_steps
+from confab.planner.preferences import preferred
 from confab.planner.transitions import Cell, arguments_of, key_of
 from confab.planner.validation import validate
 from confab.reasoner.amounts import meets
@@ -99,6 +100,25 @@ def repair_or_replan(
     if repaired is not None and (anew is None or repaired.cost <= CLOSE * cost_of(problem, Plan(anew))):
         return RepairResult("repair", repaired.steps, repaired.cost)
     return RepairResult("replan", anew, cost_of(problem, Plan(anew or ())), outcome)
+
+
+def chosen(problem: Problem, search: Callable[[Problem], RepairResult]) -> tuple[Problem, RepairResult]:
+    """Choose among the soft goals of a problem; return the problem with the chosen goals, and the steps that `search` finds.
+
+    Without steps for the hard goals, no soft goal is chosen.
+    """
+    found: list[tuple[Plan, RepairResult]] = []
+
+    def outcome(choice: Problem) -> Outcome:
+        result = search(choice)
+        if result.steps is None:
+            return result.outcome or Outcome(Status.GAVE_UP)
+        plan = Plan(renumbered(Plan(result.steps).primitives))  # the first step may be in progress
+        found.append((plan, result))
+        return Outcome(Status.SOLVED, plan)
+
+    task, best = preferred(problem, outcome)
+    return task, next((result for plan, result in found if plan is best.plan), RepairResult("replan", None, 0.0, best))
 
 
 def repair(

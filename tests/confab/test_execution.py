@@ -295,6 +295,35 @@ def test_a_result_is_executed_as_it_was_planned() -> None:
     assert "repair" in execution._repr_html_()
 
 
+def test_a_result_of_another_scene_is_executed_as_its_plan() -> None:
+    scene = confab.load("beverage-serving")
+    result, location = scene.plan(), Symbol("LOCATION", ("cup2",))
+    other = scene.with_goal("cup2 LOCATION location8").with_fact("cup1 LOCATION location7")
+    done = other.execute(result)
+    assert done.reached
+    assert done.episode.goal == other.problem.goal
+    assert done.episode.initial == other.problem.initial
+    assert done.episode.observed[location] == "location8"
+
+
+def test_the_goals_of_an_execution_replace_those_of_its_result() -> None:
+    scene = confab.load("wishes-small")
+    done = scene.execute(scene.plan("glass IN shop"), goals="paper IN shop")
+    assert done.reached
+    assert {done.episode.observed[Symbol("IN", (one,))] for one in ("books", "glass", "paper")} == {"shop"}
+    assert [str(goal.fact) for goal in done.soft_goals] == ["store STOCK 0"]
+
+
+def test_a_result_of_another_scene_is_verified_for_the_goals_of_the_scene(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = list[object]()
+    monkeypatch.setattr("confab.physics.verify", lambda *_, goal=None: asked.append(goal))
+    scene = confab.load("beverage-serving")
+    result = scene.plan()
+    scene.verify(result)
+    scene.with_goal("cup2 LOCATION location8").verify(result)
+    assert asked == [result.problem.goal, None]
+
+
 def test_any_world_with_observe_and_execute_can_run_an_episode() -> None:
     scene = confab.load("beverage-serving")
     world = SymbolicWorld(scene.problem, {"B3_TILT": 5.0})

@@ -17,6 +17,7 @@ import confab
 import ontology
 from confab.cli import app
 from confab.plan_call import CHOICE_WORK
+from confab.planner.acting.episode import End
 from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, Step
 from confab.planner.plan_costs import cost_of
 from confab.planner.preferences import preferred
@@ -321,6 +322,56 @@ def test_execution_leaves_the_same_goals_unmet(given: str, tmp_path: Path) -> No
 def test_a_soft_goal_that_an_intervention_drops_is_not_left_unmet() -> None:
     done = confab.load("wishes-small").execute(interventions="after=0 drop-goal store STOCK")
     assert [(str(goal.fact), goal.met) for goal in done.soft_goals] == [("glass IN shop", True)]
+
+
+@pytest.mark.parametrize("happening", ["after=1 remove glass", "after=6 glass IN store"], ids=["impossible", "dear"])
+def test_a_soft_goal_that_is_no_longer_worth_its_price_is_left_unmet(happening: str) -> None:
+    done = confab.load("wishes-small").execute(interventions=happening)
+    assert done.reached
+    assert len(done.episode.events) <= 5
+    assert [(str(goal.fact), goal.met) for goal in done.soft_goals] == [
+        ("store STOCK 0", False),
+        ("glass IN shop", False),
+    ]
+    assert "soft goal left unmet: glass IN shop (weight 5)" in str(done)
+
+
+def test_a_soft_goal_that_is_cheap_enough_after_a_surprise_is_met() -> None:
+    done = confab.load("wishes-small").execute(interventions="after=6 glass IN cart")
+    assert done.reached
+    assert [(str(goal.fact), goal.met) for goal in done.soft_goals][1] == ("glass IN shop", True)
+
+
+def test_a_new_hard_goal_outweighs_a_soft_goal_that_it_excludes(tmp_path: Path) -> None:
+    scene = confab.load(written(tmp_path, "c:weight 8.0", "c:weight 500.0"))
+    assert [goal.met for goal in scene.execute().soft_goals] == [True, True]
+    done = scene.execute(interventions="after=1 goal paper IN store")
+    assert done.reached
+    assert [(str(goal.fact), goal.met) for goal in done.soft_goals] == [
+        ("store STOCK 0", False),
+        ("glass IN shop", True),
+    ]
+
+
+@pytest.mark.parametrize("weight", ["5.0", "500.0"])
+def test_soft_goals_are_not_pursued_without_a_plan_for_the_hard_goals(weight: str, tmp_path: Path) -> None:
+    scene = confab.load(written(tmp_path, "c:weight 5.0", f"c:weight {weight}"))
+    done = scene.execute(goals="shop STOCK 4")
+    assert done.episode.status is End.IMPOSSIBLE
+    assert [goal.met for goal in done.soft_goals] == [False, False]
+    assert [reason.text for reason in done.episode.reasons if "glass" in reason.text] == []
+
+
+@pytest.mark.parametrize(
+    "given",
+    [{"goals": "glass IN shop"}, {"interventions": "after=1 goal glass IN store"}],
+    ids=["given", "by an intervention"],
+)
+def test_a_goal_that_was_made_hard_is_not_listed_as_soft(given: dict[str, str], tmp_path: Path) -> None:
+    scene = confab.load("wishes-small")
+    done = scene.execute(**given)  # type: ignore[arg-type]
+    assert [(str(goal.fact), goal.met) for goal in done.soft_goals] == [("store STOCK 0", False)]
+    assert scene.read_episode(done.save(tmp_path / "episode.json")).soft_goals == done.soft_goals
 
 
 def test_a_question_about_a_soft_goal_is_answered_with_its_weight() -> None:
