@@ -169,10 +169,12 @@ class Execution(metaclass=RightNames):
 
     def graph(self) -> networkx.DiGraph[int]:
         """Return the partial order of the executed primitives. An edge leads from a primitive to a primitive that depends on it."""
+        from confab.planner.acting.executed import observed_before, with_newcomers
         from confab.planner.acting.schedule import partial_order
 
-        problem = replace(self.scene.problem, initial=self.episode.initial)
-        return partial_order(problem, self.episode.done.primitives)
+        episode = self.episode
+        problem = replace(with_newcomers(self.scene.problem, episode), initial=episode.initial)
+        return partial_order(problem, episode.done.primitives, observed_before(episode))
 
     def save(self, path: str | Path) -> Path:
         """Write the episode into a file atomically, and return the path.

@@ -6,6 +6,7 @@ that was observed before its first step.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -51,6 +52,23 @@ def as_planned(problem: Problem, episode: Episode) -> Iterator[tuple[Problem, Pl
             start, part, expected = start if part else here, [*part, step], after(problem, Plan((step,)), before)
     if part:
         yield with_reached_goals(start, expected, episode.goal), Plan(tuple(part))
+
+
+def observed_before(episode: Episode) -> dict[int, State]:
+    """Return the situations that were observed before executed primitives, by the primitive's position in the sequence.
+
+    A primitive is left out if it took no time, or if not exactly the earlier primitives of the sequence had ended when it began.
+    """
+    last = {(event.step.path, event.step.behavior, event.step.arguments): event for event in episode.events}
+    events = [last.get((step.path, step.behavior, step.arguments)) for step in episode.done.primitives]
+    times = [(math.inf, math.inf) if event is None else (event.begin, event.end) for event in events]
+    return {
+        position: situation(episode.initial, episode.course, begin)
+        for position, (begin, end) in enumerate(times)
+        if begin < end
+        and all(ended <= begin for _, ended in times[:position])
+        and all(begin <= later for later, _ in times[position:])
+    }
 
 
 def after(problem: Problem, plan: Plan, state: State) -> State:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TypeAlias
 
 import networkx
@@ -34,25 +35,30 @@ class WorkerSlot:
     end: float
 
 
-def partial_order(problem: Problem, primitives: Sequence[Step]) -> PartialOrder:
+def partial_order(
+    problem: Problem, primitives: Sequence[Step], observed: Mapping[int, State] = MappingProxyType({})
+) -> PartialOrder:
     """Return the necessary order of primitives, which begin in the initial state, as a transitively reduced graph.
 
-    The nodes are the primitives' positions in the sequence.
+    The nodes are the primitives' positions in the sequence. `observed` has the states before primitives, by position, as far as
+    they are known; other causes than the primitives may have changed them. The other states follow from the primitives.
 
     Raises
     ------
     ValueError
         A primitive isn't applicable in the state that the earlier primitives lead to.
     """
-    states: list[State] = [problem.initial]
+    states: list[State] = []
     writes: list[dict[Symbol, tuple[str | None, str]]] = []
-    for step in primitives:
-        after = followed(problem, [step], states[-1])
+    state = problem.initial
+    for position, step in enumerate(primitives):
+        before = observed.get(position, state)
+        after = followed(problem, [step], before)
         if after is None:
             raise ValueError(f"{step} isn't applicable in the state before it")
-        before = states[-1]
         writes.append({s: (before.get(s), v) for s, v in after.items() if before.get(s) != v})
-        states.append(after)
+        states.append(before)
+        state = after
     order: PartialOrder = networkx.DiGraph()
     for j, step in enumerate(primitives):
         order.add_node(j, label=str(step))
@@ -114,12 +120,13 @@ def _needs(
     """Return whether primitive `j` must wait for the earlier primitive `i`.
 
     A symbol that other primitives change between `i` and `j` gets its value from before `i` in a separate test, because `j` may
-    need any one of these changes. If `j` came first, `i` would have to leave the changes of `j` as they are.
+    need any one of these changes. A symbol that something else changes meanwhile doesn't count. If `j` came first, `i` would have
+    to leave the changes of `j` as they are.
     """
     if writes[i].keys() & writes[j].keys():
         return True
     later = {symbol for k in range(i + 1, j) for symbol in writes[k]}
-    tests = [{s: old for s, (old, _) in writes[i].items() if s not in later}]
+    tests = [{s: old for s, (old, new) in writes[i].items() if s not in later and states[j].get(s) == new}]
     tests += [{s: old} for s, (old, _) in writes[i].items() if s in later and old != states[j].get(s)]
     for test in tests:
         without = {s: v for s, v in {**states[j], **test}.items() if v is not None}

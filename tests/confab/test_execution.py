@@ -432,3 +432,16 @@ def test_an_intervention_while_both_hands_move_stops_only_the_hand_of_its_object
     assert [event.ok for event in moving if "cup2" not in event.step.arguments] == [True]
     later = [event for event in episode.events if event.begin > at]
     assert any(one.begin < other.end and other.begin < one.end for one, other in combinations(later, 2))
+
+
+@pytest.mark.parametrize(
+    "interventions",
+    ["guest1 AT hall", "add Guest guest3 AT hall, goal guest3 AT salon", "guest2 AT salon", "remove guest2"],
+)
+def test_the_order_of_executed_primitives_is_known_after_an_intervention_too(interventions: str) -> None:
+    texts = [f"after=L1#0 {one}" for one in interventions.split(", ")]
+    run = confab.load(GUESTS).execute(interventions=texts)
+    assert len(run.episode.interventions) == len(texts)
+    moved = [step.arguments[0] for step in run.plan.primitives]
+    assert {*run.graph().edges} == {(i, j) for j in range(len(moved)) for i in range(j) if moved[i] == moved[j]}
+    assert [*run.graph()] == [*range(len(moved))]
