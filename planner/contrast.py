@@ -178,8 +178,11 @@ def _beyond(
 def _bound_to(problem: Problem, behavior: Behavior, symbol: Symbol, individual: str) -> Behavior:
     """Return a behaviour that changes a symbol only if an individual has one of its roles; unchanged if no role suits it."""
     parts = [name for name, kind in behavior.kinds.items() if individual in problem.members(kind)]
-    parts = [part for part in parts if not any(part in effect.arguments[:1] for effect in behavior.effects
-                                               if effect.situation == symbol.situation)]  # fmt: skip
+    if (
+        individual not in symbol.arguments[:1]
+    ):  # a behaviour with the individual as the changed one changes another symbol
+        effects = [effect for effect in behavior.effects if effect.situation == symbol.situation]
+        parts = [part for part in parts if not any(part in effect.arguments[:1] for effect in effects)]
     if not parts:
         return behavior
     asks: list[Condition] = []

@@ -510,3 +510,8 @@ def test_an_alternative_to_a_goal_about_two_individuals_takes_the_place_of_this_
     assert told.more == -1
     assert told.plan is not None
     assert [step.arguments for step in told.plan if step.behavior == "PRESENT"] == [("guest2", "guest1")]
+
+
+def test_the_individual_that_a_goal_is_about_can_be_the_one_that_takes_part() -> None:
+    told = confab.load(GUESTS).plan().why_not("guest1 AT salon by guest1")
+    assert told.more == 0
