@@ -18,11 +18,16 @@ from confab.memory import Memory
 from confab.planner.paper.transitions import ground
 from confab.planner.plan import Status
 from confab.planner.solve import Mode
+from confab.reasoner.amounts import written
+from confab.reasoner.derivation import conditions_of_goal
 from confab.reasoner.files import alone, made_folder, write_whole
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.kinds import GENERATED
 from confab.reasoner.memory.experience_file import MemoryLines
 from confab.reasoner.names import local_name, nearest, right_arguments
+from confab.reasoner.problem import Problem
+from confab.reasoner.sentences import said
+from confab.reasoner.symbols import Fact, Symbol, Times
 from confab.reasoner.vocabulary import ARGUMENTS, CORE
 from confab.show import bindings_of
 from confab.table import Table
@@ -202,9 +207,19 @@ def _inventory(scene: Scene) -> dict[str, list[str]]:
         "situation type": sorted(problem.domain.situations),
         "behaviour": list(problem.domain.behaviors),
         "fact": scene.facts,
-        "goal": scene.goals,
+        "goal": [_goal(problem, symbol) for symbol in sorted(problem.goal)],
         "quantified": [" ".join((g.behavior, *g.arguments)) for g in grounds],
     }
+
+
+def _goal(problem: Problem, symbol: Symbol) -> str:
+    """Return the text of a goal, with its conditions, its deadline and its weight if it has them."""
+    text, by = str(Fact(symbol, problem.goal[symbol])), (problem.times or Times()).deadlines.get(symbol)
+    if conditions := conditions_of_goal(problem.domain, symbol):
+        text += f", which means {' and '.join(map(said, conditions))}"
+    if by is not None:
+        text += f" by {written(by)} s"
+    return f"{text} (weight {written(problem.weights[symbol])})" if symbol in problem.weights else text
 
 
 def _lines(scene: Scene, mode: Mode) -> tuple[str, ...]:

@@ -94,6 +94,35 @@ def test_the_difference_of_two_scenes_names_changed_facts_and_goals_and_the_reas
     assert str(difference(both, both, "guarded")).startswith("unsolvable: cup1 LOCATION location7 and")
 
 
+def test_the_difference_of_two_scenes_names_changed_weights_deadlines_and_conditions_of_goals(tmp_path: Path) -> None:
+    text = GUESTS.read_text(encoding="utf-8")
+    goal = "c:ValueCondition ; c:weight 0.5 ; c:situationType :GREETED ; c:about :guest2"
+    seconds = '"PT30S"^^<http://www.w3.org/2001/XMLSchema#dayTimeDuration>'
+    greeted = "c:AnyOf ; c:alternative [ a c:ValueCondition ; c:situationType :GREETED ; c:about :{} ]"
+    texts = {
+        "soft": text,
+        "heavier": text.replace(goal, goal.replace("0.5", "0.75")),
+        "hard": text.replace(goal, goal.replace("c:weight 0.5 ; ", "")),
+        "soon": text.replace(goal, goal.replace("c:weight 0.5", f"c:by {seconds}")),
+        "any": text.replace(goal, greeted.format("guest1")),
+        "other": text.replace(goal, greeted.format("guest2")),
+    }
+    scenes = {}
+    for name, one in texts.items():
+        (tmp_path / f"{name}.ttl").write_text(one, encoding="utf-8")
+        scenes[name] = confab.load(tmp_path / f"{name}.ttl")
+    for before, after, lost, gained in (
+        ("soft", "heavier", "guest2 GREETED true (weight 0.5)", "guest2 GREETED true (weight 0.75)"),
+        ("soft", "hard", "guest2 GREETED true (weight 0.5)", "guest2 GREETED true"),
+        ("hard", "soon", "guest2 GREETED true", "guest2 GREETED true by 30 s"),
+    ):
+        changed = difference(scenes[before], scenes[after], "guarded")
+        assert (changed.lost["goal"], changed.gained["goal"]) == ((lost,), (gained,))
+    changed = difference(scenes["any"], scenes["other"], "guarded")
+    assert "guest1" in changed.lost["goal"][0]
+    assert "guest2" in changed.gained["goal"][0]
+
+
 def test_a_comparison_of_scenes_names_the_options_that_it_does_not_take(tmp_path: Path) -> None:
     compare = ["plan", "living-room", "--diff", "living-room"]
     files = ["-o", str(tmp_path / "plan.json"), "--report", str(tmp_path / "plan.html")]
