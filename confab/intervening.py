@@ -12,6 +12,7 @@ from typing import Any
 from confab.accepting import possible
 from confab.planner.acting.episode import Intervention, InterventionKind
 from confab.planner.acting.symbolic_world import place_symbols, with_individual
+from confab.reasoner.derivation import TASK
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.names import nearest
 from confab.reasoner.possible import PLACE, refuse_derived, refuse_impossible
@@ -138,7 +139,8 @@ def _symbol(problem: Problem, words: list[str], text: str) -> Symbol:
 
 
 def _known(problem: Problem, individual: str, text: str) -> str:
-    individuals = {name for symbol in problem.initial for name in symbol.arguments[:1]}
+    kinds = {kind for situation in problem.domain.situations.values() for kind in situation.arguments} - {TASK}
+    individuals = {name for kind in kinds for name in problem.members(kind)}
     if individual not in individuals:
         raise KnowledgeError(f"'{text}': no object '{individual}'{nearest(individual, individuals)}")
     return individual

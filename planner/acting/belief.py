@@ -9,7 +9,7 @@ from functools import cached_property
 from confab.planner.acting.discovery import Discovery
 from confab.planner.acting.episode import Surprise
 from confab.planner.acting.failure_memory import Static, without_relations
-from confab.planner.acting.symbolic_world import met, with_individual
+from confab.planner.acting.symbolic_world import met, with_individual, without_individual
 from confab.planner.hierarchical.planner import Compiled, compiled
 from confab.planner.plan import Reason, Step
 from confab.planner.validation import followed
@@ -192,6 +192,11 @@ class Belief:
     def add(self, individual: str, kind: str) -> None:
         """Add an individual to the belief."""
         self.problem, self.certain = (with_individual(one, individual, kind) for one in (self.problem, self.certain))
+        self.using = compiled(self.problem)
+
+    def remove(self, individual: str) -> None:
+        """Remove an individual from the belief."""
+        self.problem, self.certain = (without_individual(one, individual) for one in (self.problem, self.certain))
         self.using = compiled(self.problem)
 
     def meet(self, found: Discovery) -> None:

@@ -489,6 +489,8 @@ class _RunningEpisode:
             self.forget([intervention.symbol])
         elif intervention.change is InterventionKind.ADD:
             self.belief.add(intervention.individual, intervention.kind)
+        elif intervention.change is InterventionKind.REMOVE:
+            self.belief.remove(intervention.individual)
         if goal != self.belief.problem.goal:
             self.belief.want(goal)
             self.want_again(self.goals.aside)

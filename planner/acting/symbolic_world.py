@@ -187,7 +187,10 @@ class SymbolicWorld:
         if intervention.change is InterventionKind.PUSH:
             self._add_spot(intervention.individual)
             return
-        after = following(self.problem, disturbed(self.problem, self.state, intervention))
+        after = disturbed(self.problem, self.state, intervention)
+        if intervention.change is InterventionKind.REMOVE:
+            self.problem = without_individual(self.problem, intervention.individual)
+        after = following(self.problem, after)
         refuse_impossible(self.problem, self.state, after, f"'{intervention.text}' can't happen")
         self.state = after
 
@@ -250,7 +253,7 @@ def disturbed(problem: Problem, state: State, intervention: Intervention) -> dic
         _let_go(problem, state, after, intervention.individual)
     if intervention.change is InterventionKind.REMOVE:
         for symbol in state:
-            if intervention.individual in symbol.arguments[:1]:
+            if intervention.individual in symbol.arguments:
                 del after[symbol]
         _let_go(problem, state, after, intervention.individual)
     for fact in intervention.facts:
@@ -299,6 +302,12 @@ def with_individual(problem: Problem, individual: str, kind: str) -> Problem:
     spread = {name: spread_to(behavior, individual, kinds) for name, behavior in behaviors.items()}
     domain = replace(problem.domain, behaviors=spread) if spread != behaviors else problem.domain
     return replace(problem, classes=classes, domain=domain)
+
+
+def without_individual(problem: Problem, individual: str) -> Problem:
+    """Return the problem without an individual, which is in none of its classes; relations and goals keep their names."""
+    classes = {name: tuple(one for one in members if one != individual) for name, members in problem.classes.items()}
+    return replace(problem, classes=classes)
 
 
 def met(problem: Problem, found: Discovery) -> Problem:

@@ -445,3 +445,18 @@ def test_the_order_of_executed_primitives_is_known_after_an_intervention_too(int
     moved = [step.arguments[0] for step in run.plan.primitives]
     assert {*run.graph().edges} == {(i, j) for j in range(len(moved)) for i in range(j) if moved[i] == moved[j]}
     assert [*run.graph()] == [*range(len(moved))]
+
+
+def test_an_object_all_of_whose_facts_are_false_can_be_removed() -> None:
+    run = confab.load(GUESTS).execute(goals="anna CALLED true", interventions="after=L1#0 remove anna")
+    assert run.episode.status is End.IMPOSSIBLE
+    assert "CALL" not in {step.behavior for step in run.plan.primitives}
+    assert "anna CALLED true" in {reason.text[:16] for reason in run.episode.reasons}
+
+
+def test_no_step_uses_a_removed_object() -> None:
+    goals = ["guest2 AT hall", "guest1 KNOWS guest2"]
+    run = confab.load(GUESTS).execute(goals=goals, interventions="at=0.5 remove guest2")
+    assert run.episode.status is End.IMPOSSIBLE
+    assert not any("guest2" in step.arguments for step in run.plan.primitives)
+    assert not any("guest2" in symbol.arguments for symbol in run.episode.observed)
