@@ -460,3 +460,19 @@ def test_no_step_uses_a_removed_object() -> None:
     assert run.episode.status is End.IMPOSSIBLE
     assert not any("guest2" in step.arguments for step in run.plan.primitives)
     assert not any("guest2" in symbol.arguments for symbol in run.episode.observed)
+
+
+@pytest.mark.parametrize(
+    ("goal", "greeted"), [("c:ValueCondition ; c:about :Guest ; c:situationType :GREETED", 2), ("none", 3)]
+)
+def test_a_goal_with_a_quantifier_and_no_goal_about_a_class_is_about_added_objects(
+    goal: str, greeted: int, tmp_path: Path
+) -> None:
+    whole = GUESTS.read_text(encoding="utf-8").replace("c:goal :here, :there, :greeted", "c:goal :all")
+    ungreeted = "c:ValueCondition ; c:about :all.x ; c:situationType :GREETED ; c:negated true"
+    none = f"c:Witness ; c:negated true ; c:witness :all.x ; c:condition [ a {ungreeted} ]"
+    whole += f":all a owl:NamedIndividual, {none if goal == 'none' else goal} .\n"
+    (tmp_path / "all.ttl").write_text(f"{whole}:all.x a owl:NamedIndividual, c:Variable ; c:termType :Guest .\n")
+    run = confab.load(tmp_path / "all.ttl").execute(interventions="after=L1#0 add Guest guest3 AT hall")
+    assert run.reached
+    assert [step.behavior for step in run.plan.primitives] == ["GREET"] * greeted
