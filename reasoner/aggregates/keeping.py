@@ -19,7 +19,6 @@ symbol only loses a value doesn't start to contribute, unless the condition on t
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -374,19 +373,18 @@ class _Keeping:
         for operation, by, formulas in found:
             asked = both(formulas)
             if asked is not None:
-                fixed = {*arguments, *terms_of(by), *self.own.kinds, *([each.name] if each is not None else [])}
+                own = (*arguments, *tuple_.values(), *terms_of(by), *self.own.kinds)
+                fixed = {*own, *([each.name] if each is not None else [])}
                 yield AmountEffect(self.aggregate.situation, arguments, operation, by, self._closed(asked, fixed), each)
 
     def _closed(self, asked: tuple[Condition, ...], bound: Iterable[str]) -> tuple[Condition, ...]:
-        """Return a conjunction with a witness for each variable that belongs to a single disjunction.
+        """Return a conjunction with a witness for each variable that is local to a disjunction.
 
-        Such a variable comes from an effect that the disjunction distinguishes: in one alternative, the effect changes the amount
-        for some value of the variable, and in another alternative for none.
+        Such a variable may come from an effect that the disjunction distinguishes: in one alternative, the effect changes the
+        amount for some value of the variable, and in another alternative for none.
         """
-        often = Counter(term for condition in asked for term in mentions(condition))
-        several = {term for term, number in often.items() if number > 1}
         plain = {term for condition in asked if not groups(condition) for term in mentions(condition)}
-        return closed(asked, frozenset({*bound, *several, *plain}), self.after.kinds)
+        return closed(asked, frozenset({*bound, *plain}), self.after.kinds)
 
 
 def _signed(condition: Condition, wanted: bool = True) -> Iterator[tuple[Condition, bool]]:

@@ -16,7 +16,7 @@ from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.language import is_variable, mentions, substituted, terms, walk
 from confab.reasoner.names import nearest
 from confab.reasoner.problem import Domain, Problem
-from confab.reasoner.reading.parts import Parts
+from confab.reasoner.reading.parts import Parts, with_classes
 from confab.reasoner.reading.rows import is_a
 from confab.reasoner.symbols import (
     FALSE,
@@ -175,7 +175,9 @@ def with_task(problem: Problem, parts: Parts, tasks: Iterable[str]) -> Problem:
         if taken or not _is_fact(wanted, problem):
             variables = {parts.term(one): parts.parameter(one) for one in sorted(parts.terms_below(iri))}
             asked = tuple(variables[name] for name in sorted(mentions(wanted)) if name in variables)
-            problem, symbol = with_derived_goal(problem, parts.names.short(task), parts.names.short(iri), wanted, asked)
+            of_class = {parts.term(one): parts.membership(one) for one in sorted(parts.terms_below(iri))}
+            told = with_classes([wanted], {name: conditions for name, conditions in of_class.items() if conditions})
+            problem, symbol = with_derived_goal(problem, parts.names.short(task), parts.names.short(iri), told, asked)
             goal[symbol] = TRUE
             weights |= {} if weight is None else {symbol: weight}
             deadlines |= {} if by is None else {symbol: by}
@@ -257,11 +259,11 @@ def _is_fact(wanted: Condition, problem: Problem) -> bool:
 
 
 def with_derived_goal(
-    problem: Problem, task: str, name: str, wanted: Condition, variables: tuple[Parameter, ...] = ()
+    problem: Problem, task: str, name: str, wanted: Sequence[Condition], variables: tuple[Parameter, ...] = ()
 ) -> tuple[Problem, Symbol]:
     """Return a problem with a new boolean situation type, and the symbol of this type.
 
-    The symbol is true if the condition `wanted` holds; `variables` are the variables that `wanted` determines.
+    The symbol is true if the conditions `wanted` hold; `variables` are the variables that these conditions determine.
 
     The symbol that represents the goal has the task as its argument. A derived situation type turns a goal with alternatives or
     quantifiers into a fact like other goals.
@@ -269,7 +271,7 @@ def with_derived_goal(
     domain = problem.domain
     names = [name, *(f"{name}_{number}" for number in range(2, len(domain.situations) + 3))]
     free = next(one for one in names if one not in domain.situations and one not in problem.individuals)
-    conditions = with_extrema([wanted], domain.aggregates)
+    conditions = with_extrema(wanted, domain.aggregates)
     individuals = {t for c in conditions for inner in walk(c) for t in terms(inner) if not is_variable(t)}
     levels = [domain.situations[situation].level for situation, _ in needed(conditions)]
     levels += [problem.value_levels.get(individual, 1) for individual in individuals]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import ClassVar
@@ -22,6 +23,7 @@ from confab.reasoner.symbols import (
     TRUE,
     Aggregate,
     AmountEffect,
+    AnyOf,
     Behavior,
     ClassCondition,
     Comparison,
@@ -252,7 +254,17 @@ class Parts(NodeReader):
         asked = [(self.span(one), c) for one in self.values(iri, "precondition") for c in self.group(one)]
         made = [(self.span(one), self.effect(one)) for one in self.values(iri, "postcondition")]
         price, duration = self.price(iri), self.duration(iri)
-        more = [c for term in (*self.values(iri, "parameter"), *used) for c in self.membership(term)]
+        told = {term for _, c in asked if not groups(c) for term in mentions(c)}
+        told |= {t for n in (price, duration) if n is not None for t in terms_of(n)}
+        told |= {self.term(actor) for actor in self.values(iri, "actor")}
+        more = [c for term in self.values(iri, "parameter") for c in self.membership(term)]
+        more += [c for term in used if self.term(term) in told for c in self.membership(term)]
+        local = {
+            name: found for term in used if (name := self.term(term)) not in told and (found := self.membership(term))
+        }
+        if local:  # the classes of variables that only a group of conditions or an effect determines
+            asked = [(span, in_groups(condition, local)) for span, condition in asked]
+            made = [(span, _of_classes(effect, local)) for span, effect in made]
         more += [Comparison(n, ">=", Fraction(0)) for n in (price, duration) if not isinstance(n, Fraction | None)]
         preconditions, effects = projected(asked, made)
         timing = Timing(
@@ -373,9 +385,12 @@ class Parts(NodeReader):
                 parameters.append(Parameter(f"?argument{i}", kind))
                 compared.append(EqualityCondition(f"?argument{i}", term))
         names = {p.name for p in parameters}
-        membership = (c for t in sorted(own.values()) for c in self.membership(t))
         variables = tuple(self.parameter(t) for name, t in sorted(own.items()) if name not in names)
-        conditions = (*compared, *self.conditions(iri, "condition"), *membership)
+        told = names | {self.term(term) for term in self.values(iri, "over")}
+        if self.values(iri, "right"):
+            told |= {*terms_of(self.right(iri))}
+        members = {name: found for name, t in sorted(own.items()) if (found := self.membership(t))}
+        conditions = with_classes((*compared, *self.conditions(iri, "condition")), members, told)
         return tuple(parameters), variables, conditions
 
     def terms_below(self, iri: str) -> set[str]:
@@ -399,6 +414,42 @@ class Parts(NodeReader):
                         "declare another c:Variable"
                     )
         return {value for node in nodes for value in mentioned(node) if value in self.terms} - bound.keys()
+
+
+def with_classes(
+    conditions: Sequence[Condition], classes: Mapping[str, Sequence[Condition]], told: AbstractSet[str] = frozenset()
+) -> tuple[Condition, ...]:
+    """Return a conjunction in which the definition of a variable's class stands beside the conditions that mention the variable.
+
+    Parameters
+    ----------
+    conditions : sequence of Condition
+    classes : mapping of variable to conditions
+        The definitions of the classes of some variables.
+    told : set of str
+        The variables that belong to the whole conjunction, whatever the conditions mention.
+    """
+    plain = {term for condition in conditions if not groups(condition) for term in mentions(condition)} | told
+    local = {name: definition for name, definition in classes.items() if name not in plain}
+    found = tuple(in_groups(condition, local) for condition in conditions) if local else tuple(conditions)
+    return (*found, *(one for name in classes if name in plain for one in classes[name]))
+
+
+def in_groups(condition: Condition, classes: Mapping[str, Sequence[Condition]]) -> Condition:
+    """Return a condition whose nested groups contain the definitions of the classes of their variables."""
+    match condition:
+        case Witness(_, _, inner):
+            return replace(condition, conditions=with_classes(inner, classes))
+        case AnyOf(alternatives):
+            return replace(condition, alternatives=tuple(with_classes(group, classes) for group in alternatives))
+        case _:
+            return condition
+
+
+def _of_classes(effect: Effect, classes: Mapping[str, Sequence[Condition]]) -> Effect:
+    """Return an effect whose conditions contain the definitions of the classes of its own variables."""
+    named = {*effect.arguments, *([effect.value] if isinstance(effect, ValueEffect) else terms_of(effect.amount))}
+    return replace(effect, when=with_classes(effect.when, classes, classes.keys() & named))
 
 
 def _plain(condition: Condition) -> bool:

@@ -86,3 +86,42 @@ def test_a_constraint_holds_of_individuals_that_lack_the_defined_situation_type(
 def test_a_variable_of_a_negated_precondition_is_another_one_in_each_firing_of_an_effect(tmp_path: Path) -> None:
     """Two lamps at different powered rooms go on in one step, so that the number of pairs of lamps that are on becomes 2."""
     assert planned(tmp_path, (CASES / "pairs-of-lamps.ttl").read_text("utf-8")) == (Status.SOLVED, 1)
+
+
+WARM = (CASES / "warm-rooms.ttl").read_text("utf-8")
+"""A warm room is a room whose temperature is warm; both rooms are cold, and a step of cost 7 changes the temperature of a room."""
+STEP = ":B1 a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 1 ; c:update '''{}''' .\n"
+MOVE = STEP.format("INSERT { ?l :at ?r } WHERE { ?l a :Lamp . ?r a :Room }")
+NO_LAMP = "FILTER NOT EXISTS { ?o a :Lamp ; :at ?v . ?v a :WarmRoom }"
+LAMP = """:task.o a owl:NamedIndividual, c:Variable ; c:termType :Lamp .
+:task.v a owl:NamedIndividual, c:Variable ; c:termType :WarmRoom .
+:task.c a owl:NamedIndividual, c:ValueCondition ; c:about :task.o ; c:situationType :AT ; c:value :task.v .
+:task.one a owl:NamedIndividual, c:Witness ; c:witness :task.o ; c:condition :task.c """
+FINISHED = ":task.one a owl:NamedIndividual, c:ValueCondition ; c:about :house ; c:situationType :FIN .\n"
+COUNTED_LAMPS = (
+    """:House c:hasSituationType :N . :N a owl:NamedIndividual, c:SituationType, c:Amount ; c:valueProperty :n .
+:n a owl:DatatypeProperty, owl:FunctionalProperty, owl:NamedIndividual ; rdfs:domain :House ; rdfs:range xsd:integer .
+:N.rule a owl:NamedIndividual, c:Rule ; c:construct '''CONSTRUCT { ?h :n ?z }
+  WHERE { SELECT ?h (COUNT(?x) AS ?z) WHERE { ?h a :House . ?x a :Lamp """
+    + NO_LAMP
+    + """ } GROUP BY ?h }''' .
+:task.one a owl:NamedIndividual, c:Comparison ; c:about :house ; c:situationType :N ; c:sign "=" ; c:amount 1.0 .
+"""
+)
+EXISTS = STEP.format("INSERT { ?h :FIN true } WHERE { ?h a :House " + NO_LAMP + " }")
+
+
+@pytest.mark.parametrize(
+    ("more", "steps"),
+    [
+        (MOVE + LAMP + "; c:negated true .", 0),
+        (MOVE + LAMP + ".", 1),
+        (COUNTED_LAMPS, 0),
+        (EXISTS + FINISHED, 1),
+    ],
+    ids=["goal of no lamp", "goal of some lamp", "count", "precondition"],
+)
+def test_the_class_of_a_variable_is_required_where_the_variable_is_determined(
+    more: str, steps: int, tmp_path: Path
+) -> None:
+    assert planned(tmp_path, WARM, more=more) == (Status.SOLVED, steps)
