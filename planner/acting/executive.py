@@ -143,6 +143,7 @@ class _RunningEpisode:
     together: Concurrency | None
     soft: dict[Symbol, SoftGoal]  # the soft goals of the task
     left: frozenset[Symbol]  # the soft goals that the given plan leaves unmet
+    began: float = 0.0  # the world's clock at the beginning
     going: bool = True
     goals: Postponed = field(default_factory=Postponed)
     requested: str = ""  # the reason for checking the agenda, if a check is requested
@@ -159,7 +160,8 @@ class _RunningEpisode:
         record = self.record
         record.initial = self.belief.state
         record.course.clear()  # the facts seen so far are the initial situation
-        self.world.announce(tuple(i for i in self.waiting if i.at is not None))
+        self.began = self.world.seconds
+        self.world.announce(tuple(i for i in self.waiting if i.at is not None and i.at > self.began))
         self.want_soft_goals()
         begun, outcome, limits = plan, None, self.retries.policy.planning
         if begun is None:
@@ -445,8 +447,8 @@ class _RunningEpisode:
     # ------------------------------------------------------------------------------------------------------- interventions
 
     def intervene(self) -> None:
-        """Execute the interventions that are due after the last primitive."""
-        due = [i for i in self.due() if i.at is None or not i.of_world]
+        """Execute the interventions that are due after the last primitive, or before the first."""
+        due = [i for i in self.due() if i.at is None or not i.of_world or i.at <= self.began]
         for intervention in due:
             self.waiting.remove(intervention)
             now = self.world.seconds

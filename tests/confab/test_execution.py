@@ -476,3 +476,13 @@ def test_a_goal_with_a_quantifier_and_no_goal_about_a_class_is_about_added_objec
     run = confab.load(tmp_path / "all.ttl").execute(interventions="after=L1#0 add Guest guest3 AT hall")
     assert run.reached
     assert [step.behavior for step in run.plan.primitives] == ["GREET"] * greeted
+
+
+@pytest.mark.parametrize("steps", [0, 2])
+def test_an_intervention_at_the_beginning_takes_place_before_the_first_primitive(steps: int) -> None:
+    scene = confab.load(GUESTS) if steps else confab.load(GUESTS).without_goal("guest1", "guest2 AT")
+    run = scene.execute(interventions=["at=0 guest1 AT salon", "at=0 goal guest1 AT hall"])
+    assert not run.episode.missed
+    assert not run.episode.failures
+    assert run.reached
+    assert [at for _, at in run.episode.interventions] == [0, 0]
