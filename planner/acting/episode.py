@@ -75,7 +75,7 @@ class End(Enum):
     """The way in which an episode ended."""
 
     REACHED = "reached"
-    IMPOSSIBLE = "impossible"  # a proof shows that the goal has become unreachable
+    IMPOSSIBLE = "impossible"  # a proof shows that a goal is unreachable, or that a rest value can't be restored
     GAVE_UP = "gave-up"  # a limit was reached before the goal
 
 
@@ -195,7 +195,7 @@ class Episode:
     scene : str
     status : End
     reasons : tuple of Reason
-        The reasons why goals weren't reached.
+        The reasons why goals weren't reached, and why rest values weren't restored.
     planned : Plan
         The plan before the first step.
     done : Plan

@@ -641,13 +641,14 @@ class _RunningEpisode:
     def hopeless(self, limits: Limits) -> tuple[dict[Symbol, Reason], dict[Symbol, Reason]]:
         """Return the symbols that can't be brought to rest or, if there are none, the unreachable goals, each with the reason.
 
-        Each goal is tried alone, together with the rest values; the other goals still release their symbols from the rest values.
+        Each goal is tried alone, together with the rest values. The other goals still release their symbols from the rest values,
+        unless each goal is then reachable, although not all are.
         """
         belief, known, rests, end = self.belief, self.belief.problem, self.belief.rests, limits.end()
-        free = [symbol for symbol in {**known.goal, **known.weights} if known.may_leave_rest(symbol)]
+        free = tuple(symbol for symbol in {**known.goal, **known.weights} if known.may_leave_rest(symbol))
 
-        def why(goal: dict[Symbol, str]) -> Reason | None:
-            weights = {symbol: Fraction(0) for symbol in free if symbol not in goal}
+        def why(goal: dict[Symbol, str], released: Sequence[Symbol] = free) -> Reason | None:
+            weights = {symbol: Fraction(0) for symbol in released if symbol not in goal}
             alone = replace(belief.task, goal=goal, weights=weights)
             steps, single = replan(alone, None, belief.using, limits.until(end))
             return single.reason if steps is None and single.status is Status.UNSOLVABLE else None
@@ -657,11 +658,12 @@ class _RunningEpisode:
             each = each or dict.fromkeys(rests, together)
             return {s: unrestored(belief, self.record, Fact(s, rests[s]), reason) for s, reason in each.items()}, {}
         found = dict[Symbol, Reason]()
-        for fact in open_goals(known):
-            if (reason := why({**rests, fact.symbol: fact.value})) is not None:
-                found[fact.symbol] = blocked(belief, fact, limits.until(end)) or with_discoveries(
-                    belief, self.record, fact, reason
-                )
+        for released in dict.fromkeys((free, ())):
+            for fact in () if found else open_goals(known):
+                if (reason := why({**rests, fact.symbol: fact.value}, released)) is not None:
+                    found[fact.symbol] = blocked(belief, fact, limits.until(end)) or with_discoveries(
+                        belief, self.record, fact, reason
+                    )
         return {}, found
 
     def make_room(self) -> bool:

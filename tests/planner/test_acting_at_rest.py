@@ -162,3 +162,21 @@ def test_a_goal_that_was_set_aside_is_pursued_again_after_a_change_of_the_goals(
     episode = acted(problem, hope)
     assert episode.status is End.REACHED
     assert names(episode) == ["OPEN_IT", "FIND"]
+
+
+def test_of_two_goals_that_exclude_each_other_the_goal_that_is_reachable_alone_is_reached() -> None:
+    heat, pen = Symbol("HEAT", ("oven",)), Symbol("FOUND", ("pen",))
+    problem = world(
+        [SituationType("HEAT", ("Oven",), "Heat", rest="cold"), SituationType("FOUND", ("Pen",), "Truth", boolean=True)],
+        [
+            behavior("WARM", 1, "?o:Oven", [has("HEAT", "?o", "cold")], [becomes("HEAT", "?o", "warm")]),
+            behavior("HEAT_IT", 1, "?o:Oven", [has("HEAT", "?o", "cold")], [becomes("HEAT", "?o", "hot")]),
+            behavior("MELT", 1, "?p:Pen ?o:Oven", [has("HEAT", "?o", "warm")], [becomes("FOUND", "?p", TRUE)]),
+        ],
+        {"Pen": ("pen",), "Oven": ("oven",), "Heat": ("cold", "warm", "hot")},
+        {"HEAT oven": "cold", "FOUND pen": FALSE},
+        {"HEAT oven": "hot", "FOUND pen": TRUE},
+    )  # fmt: skip
+    episode = acted(problem)
+    assert episode.status is End.IMPOSSIBLE
+    assert (episode.observed[heat], episode.observed[pen]) == ("hot", FALSE)
