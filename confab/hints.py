@@ -27,7 +27,7 @@ OVERVIEW: Mapping[str, str] = {
     "soft_goals; to walk: plan.steps, plan.primitives, plan.length, plan.at_level(LEVEL); to ask: why(STEP), why_not(WHAT), "
     "explain(), labels, purposes, dearer(), certificate; to try: verify(), execute(); to show: print(result), report(FILE), "
     "plan.to_dot(); to save: save(FILE), json(), plan.to_dataframe(), plan.to_networkx(); to plan again: scene.plan(GOALS), "
-    "in_order(ID, …); also: plan, outcome, problem, scene, optimal, options, part, queries, faults, in_whole_scene",
+    "in_order(ID, …); also: plan, outcome, problem, scene, optimal, options, part, queries, faults, task, in_whole_scene",
     "plan": "to read: plan[NUMBER], steps, primitives, length, at_level(LEVEL), walk(), index(STEP); to ask: result.why(STEP), "
     "result.why_not(WHAT), result.cost, result.timed, result.labels; to try: scene.verify(plan), scene.execute(plan); to show: "
     "print(plan), to_dot(), result.report(FILE); to save: result.save(FILE), json(), to_records(), to_dataframe(), "
@@ -49,8 +49,9 @@ OVERVIEW: Mapping[str, str] = {
     "happened: episode.events, episode.failures, episode.interventions, episode.replans, episode.observed, episode.course, "
     "notes(); to show: summary(), report(FILE), graph(); to save: save(FILE), json(); to go on: scene.execute(), "
     "memory.learn(scene, execution), scene.read_episode(FILE); also: episode, scene",
-    "episode": "to read: status, reasons, done, planned, initial, observed, goal, course, seconds, scene; what happened: "
-    "events, failures, interventions, replans, missed, discovered, refuted; to save: execution.save(FILE); also: measured",
+    "episode": "to read: status, reasons, done, planned, initial, observed, goal, soft_goals, course, seconds, scene; what "
+    "happened: events, failures, interventions, replans, missed, discovered, refuted; to save: execution.save(FILE); also: "
+    "measured",
     "report": "to read: verified, good, rate(), rollouts, shown.failure, trusted, poured, plan, goal, missed(ROLLOUT), noise, "
     "perturb; to show: summary(), table(), video, film_speed, notes(), result.report(FILE); to save: json(); to try again: "
     "scene.verify(plan); to read files: scene.read_report(FILE, PLAN); also: shown, scene",
@@ -67,8 +68,8 @@ OVERVIEW: Mapping[str, str] = {
     "records(), dataframe(), csv(), tsv(), turtle(), iris(), standard(FORMAT); to show: print(table); also: terms, empty",
     "problem": "to read: initial, goal, individuals, classes, relations, domain.behaviors, domain.situations, weights, times, "
     "scene; to ask: members(CLASS), values(SYMBOL, LEVEL), goal_on(LEVEL), at_rest(LEVEL), id_of(BEHAVIOR, ARGUMENTS); also: "
-    "quantified, domain, first_level, only, without_goals, releases, read_by_goals, concerns, may_leave_rest, parents, sees, "
-    "below, superclasses, value_levels",
+    "quantified, domain, first_level, only, without_goals, releases, read_by_goals, related, concerns, may_leave_rest, parents, "
+    "sees, below, superclasses, value_levels",
     "domain": "to read: behaviors, situations, levels, at_level(LEVEL), rules, constraints, aggregates, authored; also: "
     "first_ids, remembers",
     "behaviour": "to read: name, level, parameters, preconditions, effects, cost, variables, timing, amounts; to ask: "
