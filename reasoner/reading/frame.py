@@ -17,6 +17,7 @@ from confab.reasoner.derivation import TASK, circles, needed
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.language import DomainError, walk
 from confab.reasoner.limits import checked
+from confab.reasoner.local_variables import named_apart, rule_named_apart
 from confab.reasoner.names import Names, local_name
 from confab.reasoner.problem import Domain, below
 from confab.reasoner.reading import swrl
@@ -124,7 +125,7 @@ def frame(
         lifted = earlier.lifted
     else:
         in_order = sorted(ordered(schema.of_kind("Behavior"), nodes, names), key=parts.level)
-        lifted = {names.short(iri): parts.behavior(iri) for iri in in_order}
+        lifted = {names.short(iri): named_apart(parts.behavior(iri)) for iri in in_order}
     kinds = {s.name: s for s in situations}
     stated = _rules(parts, schema, kinds)
     rules = {
@@ -225,7 +226,7 @@ def _rules(
                     f"<{iri}> is defined by <{min(by)}>, but has values; a defined situation type is boolean or an amount that is "
                     f"aggregated: {mend}"
                 )
-        rules = [parts.rule(rule, kinds) for rule in written[iri]] + by_swrl.get(iri, [])
+        rules = [rule_named_apart(parts.rule(rule, kinds)) for rule in written[iri]] + by_swrl.get(iri, [])
         if said and len(kinds) != 1:
             raise KnowledgeError(
                 f"<{iri}> has c:holdsOf, so it needs one argument, but {len(kinds)} are stated; "

@@ -14,6 +14,7 @@ from confab.reasoner.closure import closure
 from confab.reasoner.derivation import TASK, needed
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.language import is_variable, mentions, substituted, terms, walk
+from confab.reasoner.local_variables import rule_named_apart
 from confab.reasoner.names import nearest
 from confab.reasoner.problem import Domain, Problem
 from confab.reasoner.reading.parts import Parts, with_classes
@@ -276,7 +277,7 @@ def with_derived_goal(
     levels = [domain.situations[situation].level for situation, _ in needed(conditions)]
     levels += [problem.value_levels.get(individual, 1) for individual in individuals]
     derived = SituationType(free, (TASK,), "Truth", max(levels, default=1), default=FALSE, boolean=True)
-    rule = Rule(free, (Parameter("?task", TASK),), variables, conditions)
+    rule = rule_named_apart(Rule(free, (Parameter("?task", TASK),), variables, conditions))
     tasks = tuple(dict.fromkeys((*problem.classes.get(TASK, ()), task)))
     more = replace(domain, situations={**domain.situations, free: derived}, rules={**domain.rules, free: (rule,)})
     classes = {**problem.classes, TASK: tasks, "Truth": problem.classes.get("Truth", (FALSE, TRUE))}
