@@ -17,7 +17,7 @@ from typing import TypeAlias
 
 from confab.reasoner.amounts import Amount, Calculation, Expression, after_effect, put_in, situations_in, terms_of
 from confab.reasoner.effects import made_of
-from confab.reasoner.language import groups, is_variable, mentions, situations_of, substituted, walk
+from confab.reasoner.language import is_variable, mentions, plain_variables, situations_of, substituted, walk
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -122,11 +122,8 @@ class Afterwards:
     def __post_init__(self) -> None:
         """Record the values that the preconditions determine."""
         preconditions = self.behavior.preconditions
-        plain = (
-            mentions(condition) for condition in preconditions if not groups(condition)
-        )  # others are local variables
-        bound = {p.name for p in self.behavior.parameters}.union(*plain)
-        self._fixed = frozenset(bound)
+        bound = {p.name for p in self.behavior.parameters}
+        self._fixed = frozenset(bound | plain_variables(preconditions))
         preconditions = preconditions if self.holding is None else tuple(self.holding)
         self._known = {
             (c.situation, c.arguments): FALSE if c.negated else c.value
@@ -392,7 +389,7 @@ def closed(conditions: Iterable[Condition], bound: frozenset[str], kinds: Mappin
     """
 
     def group(conditions: Sequence[Condition], bound: frozenset[str]) -> tuple[Condition, ...]:
-        own = sorted({t for c in conditions if not groups(c) for t in mentions(c)} - bound)
+        own = sorted(plain_variables(conditions) - bound)
         found = tuple(one(condition, bound | {*own}) for condition in conditions)
         for variable in own:
             found = (Witness(variable, kinds[variable], found),)

@@ -133,6 +133,11 @@ def mentions(condition: Condition) -> set[str]:
     return inner - {condition.variable} if isinstance(condition, Witness) else inner
 
 
+def plain_variables(conditions: Iterable[Condition]) -> set[str]:
+    """Return the variables of a conjunction, except variables that only witnesses and disjunctions inside of it mention."""
+    return {term for condition in conditions if not groups(condition) for term in mentions(condition)}
+
+
 def needs(condition: Condition) -> set[str]:
     """Return the variables that must be bound before a condition can be evaluated; the condition binds its other variables.
 

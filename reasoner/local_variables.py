@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from itertools import count
 
 from confab.reasoner.amounts import put_in
-from confab.reasoner.language import groups, mentions, substituted, walk
+from confab.reasoner.language import groups, plain_variables, substituted, walk
 from confab.reasoner.symbols import AnyOf, Behavior, Condition, Effect, Parameter, Rule, ValueEffect, Witness
 
 
@@ -24,7 +24,7 @@ def named_apart(behavior: Behavior) -> Behavior:
     if not any(groups(c) for c in (*asked, *(c for effect in made for c in effect.when))):
         return behavior
     actors = timing.actors if timing else ()
-    bound = frozenset({p.name for p in behavior.parameters}.union(actors, _plain(asked)))
+    bound = frozenset({p.name for p in behavior.parameters}.union(actors, plain_variables(asked)))
     names = _LocalNames(dict(behavior.kinds), set().union(*(map(_witnesses, behavior.conditions))))
     asked = list(dict.fromkeys(asked))
     conditions = dict(zip(asked, names.within(asked, bound), strict=True))
@@ -84,14 +84,14 @@ class _LocalNames:
 
     def group(self, conditions: Sequence[Condition], bound: frozenset[str]) -> tuple[Condition, ...]:
         """Return a group of conditions with new names for local variables whose names are taken."""
-        terms = self.chosen(_plain(conditions) - bound)
+        terms = self.chosen(plain_variables(conditions) - bound)
         renamed = [substituted(c, terms) for c in conditions] if terms else conditions
-        return self.within(renamed, bound | _plain(renamed))
+        return self.within(renamed, bound | plain_variables(renamed))
 
     def effect(self, effect: Effect, bound: frozenset[str]) -> Effect:
         """Return an effect with new names for its own variables whose names are taken by groups of preconditions."""
         bound |= {effect.each.name} if effect.each else set()
-        terms = self.chosen(_plain(effect.when) - bound)
+        terms = self.chosen(plain_variables(effect.when) - bound)
         if terms:
             arguments = tuple(terms.get(a, a) for a in effect.arguments)
             when = tuple(substituted(c, terms) for c in effect.when)
@@ -99,7 +99,7 @@ class _LocalNames:
                 effect = replace(effect, arguments=arguments, value=terms.get(effect.value, effect.value), when=when)
             else:
                 effect = replace(effect, arguments=arguments, amount=put_in(effect.amount, terms), when=when)
-        return replace(effect, when=self.within(effect.when, bound | _plain(effect.when)))
+        return replace(effect, when=self.within(effect.when, bound | plain_variables(effect.when)))
 
     def chosen(self, variables: Iterable[str]) -> dict[str, str]:
         """Return new names for those of a group's own variables whose names are taken, and take the variables' names."""
@@ -112,11 +112,6 @@ class _LocalNames:
                 found[variable] = free
             self.taken.add(found.get(variable, variable))
         return found
-
-
-def _plain(conditions: Iterable[Condition]) -> frozenset[str]:
-    """Return the variables of conditions outside of witnesses and disjunctions."""
-    return frozenset(term for condition in conditions if not groups(condition) for term in mentions(condition))
 
 
 def _witnesses(condition: Condition) -> set[str]:

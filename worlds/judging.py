@@ -16,7 +16,6 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
-from math import prod
 from pathlib import Path
 from random import Random
 from time import process_time
@@ -71,6 +70,8 @@ SLICED = 25
 """Number of reachable states in which behaviours in a part of a world are compared with those in the world."""
 FEW_CASES = 30
 """Maximum number of cases of a certificate that is corrupted, so that its checks take little time."""
+ASSIGNMENTS = 20_000
+"""Maximum number of assignments to the variables of the behaviours of an imported world that is searched exhaustively."""
 SOFT_MODES: dict[str, dict[str, Any]] = {
     "soft": {}, "soft optimal": {"optimal": True}, "soft paper": {"mode": "paper"}, "soft strict": {"leave_levels": False},
 }  # fmt: skip
@@ -451,7 +452,7 @@ class Judge:
             return imported(parse(exported.domain, exported.problem)).problem
 
         again = self.call(mode, back)
-        if again is None:
+        if again is None or _assignments(again) > ASSIGNMENTS:
             return
         try:
             got = least_total(least_costs(Interpreter(again), 4 * MOST), again.weights)
@@ -862,3 +863,9 @@ class Judge:
         else:
             values = ("true", "false") if kind.boolean else self.world.problem.classes[kind.range]
         return " ".join((symbol.arguments[0], symbol.situation, *symbol.arguments[1:], self.rng.choice(values)))
+
+
+def _assignments(problem: Problem) -> int:
+    """Return the number of assignments of individuals to the parameters and variables of a problem's behaviours."""
+    behaviors, classes = problem.domain.behaviors.values(), problem.classes
+    return sum(math.prod(len(classes.get(kind, ())) for kind in one.kinds.values()) for one in behaviors)

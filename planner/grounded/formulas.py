@@ -15,10 +15,9 @@ from typing import Protocol
 
 from confab.planner.grounded.amounts import AmountTable
 from confab.planner.grounded.joins import JoinTable
-from confab.planner.grounded.schemas import plain_variables
 from confab.planner.plan import UngroundableError
 from confab.reasoner.amounts import Amount, bounds
-from confab.reasoner.language import mentions, substituted
+from confab.reasoner.language import mentions, plain_variables, substituted
 from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     FALSE,

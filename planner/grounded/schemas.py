@@ -15,7 +15,7 @@ from itertools import count
 
 from confab.reasoner.amounts import put_in, situations_in, terms_of
 from confab.reasoner.effects import allowed
-from confab.reasoner.language import DomainError, is_variable, mentions, substituted, terms, walk
+from confab.reasoner.language import DomainError, is_variable, mentions, plain_variables, substituted, terms, walk
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -282,8 +282,3 @@ class _Compiler:
 
     def _fluent(self, condition: Condition) -> bool:
         return _changing(condition, self.changed)
-
-
-def plain_variables(group: Sequence[Condition]) -> set[str]:
-    """Return the variables of a group of conditions, except variables inside witnesses and disjunctions."""
-    return {t for c in group if not isinstance(c, Witness | AnyOf) for t in mentions(c)}

@@ -12,7 +12,7 @@ from confab.reasoner.aggregates.keeping import MOST_CONDITIONS
 from confab.reasoner.aggregates.remembering import in_order_of_update, remembering, stated
 from confab.reasoner.effects import spread
 from confab.reasoner.folding import Folding
-from confab.reasoner.language import DomainError, groups, mentions, walk
+from confab.reasoner.language import DomainError, mentions, plain_variables, walk
 from confab.reasoner.limits import check
 from confab.reasoner.problem import Domain
 from confab.reasoner.symbols import AnyOf, Behavior, Condition, Effect, Witness
@@ -67,8 +67,7 @@ def _prevented(behavior: Behavior, domain: Domain, classes: Mapping[str, Sequenc
     counts = [effect for effect in behavior.amounts if effect.situation in domain.constraints]
     amounts = tuple(effect for effect in behavior.amounts if effect.situation not in domain.constraints)
     kinds = {**behavior.kinds, **{one.each.name: one.each.kind for one in counts if one.each is not None}}
-    plain = (mentions(condition) for condition in behavior.preconditions if not groups(condition))
-    bound = {p.name for p in behavior.parameters}.union(*plain)
+    bound = {p.name for p in behavior.parameters} | plain_variables(behavior.preconditions)
     folding, preconditions = Folding(classes, kinds, frozenset(behavior.preconditions)), list(behavior.preconditions)
     for effect in counts:
         inner = folding.conjunction(effect.when)

@@ -10,7 +10,7 @@ from confab.reasoner.afterwards import closed
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, inside, situations_in
 from confab.reasoner.closure import closure
 from confab.reasoner.derivation import circular
-from confab.reasoner.language import DomainError, groups, mentions, situations_of, substituted, walk
+from confab.reasoner.language import DomainError, plain_variables, situations_of, substituted, walk
 from confab.reasoner.symbols import (
     FALSE,
     Aggregate,
@@ -107,9 +107,7 @@ def unfolded(
         number = next(numbers)
         terms = dict(zip((p.name for p in rule.parameters), arguments, strict=True))
         terms |= {v.name: f"{v.name}_rule{number}" for v in rule.variables}
-        plain = {
-            term for c in rule.conditions if not groups(c) for term in mentions(c)
-        }  # others are local to a disjunction
+        plain = plain_variables(rule.conditions)  # other variables are local to a disjunction or witness
         asked = closed(rule.conditions, frozenset(plain | {p.name for p in rule.parameters}), rule.behavior.kinds)
         found = tuple(one(substituted(condition, terms)) for condition in asked)
         for variable in rule.variables:

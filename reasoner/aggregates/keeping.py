@@ -38,7 +38,7 @@ from confab.reasoner.afterwards import (
 from confab.reasoner.aggregates.dependencies import divides, existing, read_by
 from confab.reasoner.amounts import Amount, Calculation, Expression, inside, put_in, terms_of
 from confab.reasoner.effects import made_of
-from confab.reasoner.language import groups, is_variable, mentions, substituted, walk
+from confab.reasoner.language import groups, is_variable, mentions, plain_variables, substituted, walk
 from confab.reasoner.limits import check
 from confab.reasoner.symbols import (
     Aggregate,
@@ -383,8 +383,7 @@ class _Keeping:
         Such a variable may come from an effect that the disjunction distinguishes: in one alternative, the effect changes the
         amount for some value of the variable, and in another alternative for none.
         """
-        plain = {term for condition in asked if not groups(condition) for term in mentions(condition)}
-        return closed(asked, frozenset({*bound, *plain}), self.after.kinds)
+        return closed(asked, frozenset({*bound, *plain_variables(asked)}), self.after.kinds)
 
 
 def _signed(condition: Condition, wanted: bool = True) -> Iterator[tuple[Condition, bool]]:

@@ -17,7 +17,8 @@ negated condition          ``FILTER NOT EXISTS { … }``
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from fractions import Fraction
 from itertools import chain, product
 
@@ -27,6 +28,7 @@ from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, af
 from confab.reasoner.derivation import circular, strata
 from confab.reasoner.effects import allowed
 from confab.reasoner.graph.knowledge import BASE, SCENE, KnowledgeGraph, text
+from confab.reasoner.language import plain_variables
 from confab.reasoner.limits import checked
 from confab.reasoner.reading.problem import Reading
 from confab.reasoner.reading.restating import VALUE_PROPERTIES, said, value_properties
@@ -173,6 +175,8 @@ class _PatternWriter:
         self.graph, self.reading = graph, reading
         self.properties = dict(_pairs(graph, VALUE_PROPERTIES))
         self.numbers = 0  # number of variables for amounts
+        self.kinds: dict[str, str] = {}  # the classes of the variables of the behaviour
+        self.bound: set[str] = set()  # the variables that aren't local to the present group
         self.relations = {text(iri) for (iri,) in graph.select(RELATION_PROPERTIES, SCENE)}
 
     def rows(self, behavior: Behavior) -> Iterator[dict[str, str]]:
@@ -192,6 +196,7 @@ class _PatternWriter:
     def query(self, behavior: Behavior, ordered: bool = True) -> str:
         names = self.names(behavior)
         kinds = behavior.kinds
+        self.kinds, self.bound = dict(kinds), {*names, *plain_variables(behavior.preconditions)}
         situations = self.reading.problem.domain.situations
         bounds = (*allowed(behavior, situations), *allowed_together(behavior, situations), *calculable(behavior))
         conditions = (*behavior.preconditions, *bounds)
@@ -238,18 +243,47 @@ class _PatternWriter:
             case EqualityCondition(left, right):
                 yield f"FILTER({self.term(left)} = {self.term(right)})"
             case Witness(variable, kind, conditions):
-                for inner in conditions:
-                    yield from self.pattern(inner)
+                self.kinds[variable] = kind
+                yield from self.group(conditions, {variable})
                 known = any(_names(inner, variable) for inner in conditions)
                 # If the conditions bind the variable, a test of the class is hundreds of times as fast as a join.
                 yield f"FILTER EXISTS {{ {self.typed(variable, kind)} }}" if known else self.typed(variable, kind)
             case AnyOf(alternatives):
-                groups = (" ".join(line for inner in group for line in self.pattern(inner)) for group in alternatives)
-                yield "FILTER(" + " || ".join(f"EXISTS {{ {group} }}" for group in groups) + ")"
+                said = (" ".join(self.group(alternative)) for alternative in alternatives)
+                yield "FILTER(" + " || ".join(f"EXISTS {{ {group} }}" for group in said) + ")"
             case Comparison(left, sign, right):
                 patterns: list[str] = []
                 test = f"FILTER({self.amount(left, patterns)} {sign} {self.amount(right, patterns)})"
                 yield from (*patterns, test)
+
+    def group(self, conditions: Sequence[Condition], typed: AbstractSet[str] = frozenset()) -> list[str]:
+        """Return the SPARQL lines for a group of conditions, with the classes of its local variables except those in `typed`."""
+        plain, bound = plain_variables(conditions), self.bound
+        self.bound = bound | plain | typed
+        lines = [line for inner in conditions for line in self.pattern(inner)]
+        self.bound = bound
+        for name in sorted((plain & self.kinds.keys()) - bound - typed):
+            if not any(self.has_class(inner, name) for inner in conditions):
+                known, said = any(_names(inner, name) for inner in conditions), self.typed(name, self.kinds[name])
+                lines.append(f"FILTER EXISTS {{ {said} }}" if known else said)
+        return lines
+
+    def has_class(self, condition: Condition, variable: str) -> bool:
+        """Return whether a condition determines a variable, and each value that it can determine has the variable's class."""
+        match condition:
+            case ValueCondition(situation, _, value, False) if value == variable:
+                problem = self.reading.problem
+                return problem.below(problem.domain.situations[situation].range, self.kinds[variable])
+            case _:
+                return False
+
+    def having(self, situation: str, arguments: Sequence[str]) -> Iterator[str]:
+        """Yield the SPARQL lines for the condition that individuals have a situation type, unless their classes imply it."""
+        problem = self.reading.problem
+        for term, kind in zip(arguments, problem.domain.situations[situation].arguments, strict=True):
+            known = problem.below(self.kinds[term], kind) if term in self.kinds else term in problem.members(kind)
+            if not known:
+                yield f"FILTER EXISTS {{ {self.typed(self.term(term), kind)} }}"
 
     def amount(self, expression: Expression, patterns: list[str]) -> str:
         """Return the SPARQL expression of a numeric expression, and add the patterns that bind its variables to `patterns`."""
@@ -276,7 +310,8 @@ class _PatternWriter:
 
     def value(self, situation: str, arguments: tuple[str, ...], value: str) -> str:
         if value == FALSE:
-            return f"FILTER NOT EXISTS {{ {self.value(situation, arguments, TRUE)} }}"
+            false = f"FILTER NOT EXISTS {{ {self.value(situation, arguments, TRUE)} }}"
+            return " ".join([*self.having(situation, arguments), false])
         terms = [self.term(argument) for argument in (*arguments, *([] if value == TRUE else [value]))]
         prop = self.properties.get(self.reading.names.iri(situation))
         if prop and len(terms) == 2:

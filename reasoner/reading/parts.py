@@ -13,7 +13,7 @@ from confab.reasoner.amounts import OPERATIONS, Amount, Expression, Measure, ter
 from confab.reasoner.closure import closure
 from confab.reasoner.condition_nodes import NodeReader, NodeValues
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.language import groups, mentions
+from confab.reasoner.language import groups, mentions, plain_variables
 from confab.reasoner.names import Names, local_name
 from confab.reasoner.reading.definitions import Definitions
 from confab.reasoner.reading.rows import HIGHEST_COST, HIGHEST_LEVEL, is_a, ordered, whole_number
@@ -254,7 +254,7 @@ class Parts(NodeReader):
         asked = [(self.span(one), c) for one in self.values(iri, "precondition") for c in self.group(one)]
         made = [(self.span(one), self.effect(one)) for one in self.values(iri, "postcondition")]
         price, duration = self.price(iri), self.duration(iri)
-        told = {term for _, c in asked if not groups(c) for term in mentions(c)}
+        told = plain_variables(c for _, c in asked)
         told |= {t for n in (price, duration) if n is not None for t in terms_of(n)}
         told |= {self.term(actor) for actor in self.values(iri, "actor")}
         more = [c for term in self.values(iri, "parameter") for c in self.membership(term)]
@@ -429,7 +429,7 @@ def with_classes(
     told : set of str
         The variables that belong to the whole conjunction, whatever the conditions mention.
     """
-    plain = {term for condition in conditions if not groups(condition) for term in mentions(condition)} | told
+    plain = plain_variables(conditions) | told
     local = {name: definition for name, definition in classes.items() if name not in plain}
     found = tuple(in_groups(condition, local) for condition in conditions) if local else tuple(conditions)
     return (*found, *(one for name in classes if name in plain for one in classes[name]))

@@ -8,13 +8,17 @@ import pytest
 import confab
 from confab.planner.affordances import affordances
 from confab.planner.paper.transitions import Model, ground
+from confab.planner.validation import LoggedState
 from confab.reasoner.graph.inference import infer
 from confab.reasoner.graph.knowledge import KnowledgeGraph, load, text
 from confab.reasoner.names import local_name
 from confab.reasoner.reading.applicable import SITUATION, applicable_query, write_situation
 from confab.reasoner.reading.problem import Reading, read
-from confab.reasoner.symbols import State, Symbol
+from confab.reasoner.symbols import TRUE, State, Symbol
 from tests.ontology.faults import skeleton
+
+LAMPS = Path(__file__).parent / "cases" / "dim-lamps.ttl"
+"""A lamp and a thing that is no lamp; behaviours and rules about what is off or doesn't glow, and about things in no kitchen."""
 
 
 @cache
@@ -97,9 +101,10 @@ def states(reading: Reading, level: int) -> list[State]:
 
 
 @pytest.mark.parametrize(
-    ("name", "level"), [("beverage-serving", 1), ("beverage-serving", 2), ("beverage-serving", 3), ("living-room", 1)]
+    ("name", "level"),
+    [("beverage-serving", 1), ("beverage-serving", 2), ("beverage-serving", 3), ("living-room", 1), (LAMPS, 1)],
 )
-def test_sparql_and_the_planner_agree_on_the_applicable_behaviours(name: str, level: int) -> None:
+def test_sparql_and_the_planner_agree_on_the_applicable_behaviours(name: str | Path, level: int) -> None:
     graph, reading = scene(name)
     model, grounds = Model(reading.problem), ground(reading.problem, level)
     for state in states(reading, level):
@@ -111,6 +116,18 @@ def test_sparql_and_the_planner_agree_on_the_applicable_behaviours(name: str, le
                 arguments = [reading.names.short(term.value) for term in row[: len(behavior.parameters)] if term]
                 found.add((behavior.name, *arguments))
         assert found == wanted
+
+
+def test_queries_see_the_derived_facts_that_planning_sees() -> None:
+    """A fact is false only of individuals that have its situation type, and a local variable has its class."""
+    graph, reading = scene(LAMPS)
+    write_situation(graph, reading)
+    asked = f"SELECT ?kind ?about WHERE {{ GRAPH <{SITUATION}> {{ [] :situationType ?kind ; :about ?about }} }}"
+    found = {(local_name(text(kind)), local_name(text(about))) for kind, about in graph.select(asked, ("situation",))}
+    facts = LoggedState(reading.problem, reading.problem.initial)
+    derived = {(name, one) for name in ("D1", "D2", "D3", "GLOWS") for one in ("l1", "t1")}
+    assert found & derived == {(name, one) for name, one in derived if facts.value(name, (one,)) == TRUE}
+    assert ("D1", "l1") in found
 
 
 def test_the_query_of_applicable_behaviours_names_the_graph_of_the_situation() -> None:

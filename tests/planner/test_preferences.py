@@ -15,6 +15,7 @@ from click.testing import CliRunner
 
 import confab
 import ontology
+from confab.accepting import Facts
 from confab.cli import app
 from confab.plan_call import CHOICE_WORK
 from confab.planner.acting.episode import End
@@ -363,13 +364,13 @@ def test_soft_goals_are_not_pursued_without_a_plan_for_the_hard_goals(weight: st
 
 
 @pytest.mark.parametrize(
-    "given",
-    [{"goals": "glass IN shop"}, {"interventions": "after=1 goal glass IN store"}],
+    ("goals", "interventions"),
+    [("glass IN shop", ()), ((), "after=1 goal glass IN store")],
     ids=["given", "by an intervention"],
 )
-def test_a_goal_that_was_made_hard_is_not_listed_as_soft(given: dict[str, str], tmp_path: Path) -> None:
+def test_a_goal_that_was_made_hard_is_not_listed_as_soft(goals: Facts, interventions: Facts, tmp_path: Path) -> None:
     scene = confab.load("wishes-small")
-    done = scene.execute(**given)  # type: ignore[arg-type]
+    done = scene.execute(goals=goals, interventions=interventions)
     assert [(str(goal.fact), goal.met) for goal in done.soft_goals] == [("store STOCK 0", False)]
     assert scene.read_episode(done.save(tmp_path / "episode.json")).soft_goals == done.soft_goals
 
