@@ -70,8 +70,6 @@ SLICED = 25
 """Number of reachable states in which behaviours in a part of a world are compared with those in the world."""
 FEW_CASES = 30
 """Maximum number of cases of a certificate that is corrupted, so that its checks take little time."""
-ASSIGNMENTS = 20_000
-"""Maximum number of assignments to the variables of the behaviours of an imported world that is searched exhaustively."""
 SOFT_MODES: dict[str, dict[str, Any]] = {
     "soft": {}, "soft optimal": {"optimal": True}, "soft paper": {"mode": "paper"}, "soft strict": {"leave_levels": False},
 }  # fmt: skip
@@ -452,7 +450,7 @@ class Judge:
             return imported(parse(exported.domain, exported.problem)).problem
 
         again = self.call(mode, back)
-        if again is None or _assignments(again) > ASSIGNMENTS:
+        if again is None or _assignments(again) > MOST_ACTIONS:
             return
         try:
             got = least_total(least_costs(Interpreter(again), 4 * MOST), again.weights)
@@ -734,11 +732,7 @@ class Judge:
         # unified-planning reads no axioms
         if ":derived " not in exported.domain and self.sampled(READERS, "reader", "export"):
             self.read_by_unified_planning(mode, exported.domain, exported.problem)
-        actions = (
-            prod(len(problem.members(p.kind)) for p in (*b.parameters, *b.variables))
-            for b in problem.domain.behaviors.values()
-        )
-        if sum(actions) > MOST_ACTIONS:
+        if _assignments(problem) > MOST_ACTIONS:
             return
         again = Interpreter(problem)
         rested = {
