@@ -44,6 +44,7 @@ TESTS: dict[str, tuple[str, ...]] = {
     "reasoner/language.py": ("tests/planner/test_language.py", "tests/planner/test_behaviors.py"),
     "reasoner/symbols.py": ("tests/reasoner/test_symbols.py", "tests/planner/test_validation.py"),
     "planner/validation.py": ("tests/planner/test_checker.py", "tests/planner/test_validation.py"),
+    "planner/hierarchical/lowest_level.py": ("tests/planner/test_proofs.py",),
     "planner/hierarchical/unsolvability.py": ("tests/planner/test_proofs.py",),
     "planner/certificate_checks.py": ("tests/planner/test_certificates.py", "tests/planner/test_proofs.py"),
     "planner/possibilities.py": ("tests/planner/test_certificates.py", "tests/planner/test_proofs.py"),

@@ -218,7 +218,8 @@ def _last_proof(problem: Problem, deadline: Deadline, finding: float = 1.0) -> U
 
 
 def _proof(problem: Problem, states: int, deadline: float | None) -> UnsolvableError | None:
-    from confab.planner.hierarchical.unsolvability import AT_ONCE, PAIRS, exhausted, impossible, proved
+    from confab.planner.hierarchical.lowest_level import exhausted, proved
+    from confab.planner.hierarchical.unsolvability import AT_ONCE, PAIRS, impossible
 
     proof = impossible(problem, PAIRS if states else AT_ONCE, deadline)
     if proof is not None or not states:

@@ -664,7 +664,7 @@ class Judge:
 
     def searched(self, problem: Problem) -> None:
         """Judge the proofs by relaxed reachability and by the examination of all states, which other proofs hide."""
-        from confab.planner.hierarchical.unsolvability import exhausted, proved
+        from confab.planner.hierarchical.lowest_level import exhausted, proved
 
         try:
             task = proved(problem, problem.domain.levels[-1])

@@ -140,7 +140,7 @@ def repair(
     call = Call(problem, using, limits.end(SHARE), min(limits.expansions, MOST))
     # Only replanning can prove that the task is impossible. A repair undoes no applied step, because a restart would be a new
     # plan.
-    agenda = Agenda(call, only_forward=True)
+    agenda = Agenda(call)
     pending = list(rest)
     try:
         if in_progress and (begun or not call.at_rest()):

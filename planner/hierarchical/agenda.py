@@ -13,10 +13,11 @@ as the step is found.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from confab.planner.hierarchical.call import Call, bring_to_rest
+from confab.planner.hierarchical.lowest_level import LowestLevel
 from confab.planner.hierarchical.operators import Achiever
 from confab.planner.hierarchical.relevance import waits_for
 from confab.planner.hierarchical.search_budget import (
@@ -30,7 +31,6 @@ from confab.planner.hierarchical.search_budget import (
     scope_budgets,
 )
 from confab.planner.hierarchical.unsolvability import Proofs
-from confab.planner.plan import Plan
 from confab.planner.transitions import Cell, arguments_of
 from confab.reasoner.symbols import Condition
 
@@ -47,17 +47,15 @@ class Agenda:
         levels may be used.
     quickly : bool
         Whether the agenda tries only relevant steps and small scopes.
-    only_forward : bool
-        Whether the agenda neither restarts from the initial state nor attempts to prove that there is no plan.
-    found : function, optional
-        Function that is called with a plan of the lowest level, found meanwhile (`Proofs.found`).
+    lowest : LowestLevel, optional
+        The lowest level, which is searched for a proof or a plan meanwhile. Without it, the agenda neither restarts from the
+        initial state nor attempts to prove that there is no plan.
     """
 
     call: Call
     levels: tuple[int, ...] | None = None
     quickly: bool = False
-    only_forward: bool = False
-    found: Callable[[Plan, bool], bool] | None = None
+    lowest: LowestLevel | None = None
     _open: deque[Cell] = field(default_factory=deque)
     _asleep: dict[Cell, None] = field(default_factory=dict)
     _woken_by: dict[Cell, list[Cell]] = field(default_factory=dict)
@@ -66,15 +64,14 @@ class Agenda:
     proofs: Proofs = field(init=False)
 
     def __post_init__(self) -> None:
-        """Prepare the attempts to prove that there is no plan; an agenda that goes only forward makes none."""
-        self.proofs = Proofs(self.call, not self.only_forward, self.found)
+        self.proofs = Proofs(self.lowest or LowestLevel(self.call), wanted=self.lowest is not None)
 
     # ------------------------------------------------------------------------------------------------- one goal after another
 
     def achieve_all(self) -> bool:
         """Achieve the goals one after another, with larger search budgets for blocked goals; return whether all goals hold."""
         call = self.call
-        if not self.only_forward:
+        if self.lowest is not None:
             call.space.meanwhile = self.proofs.check
         self.begin()
         while self._open or self._asleep:
@@ -248,7 +245,7 @@ class Agenda:
         change on an upper level.
         """
         call, refiner = self.call, self.call.refiner
-        if not call.steps or self.only_forward or self._restarted or level != call.program.levels[0]:
+        if not call.steps or self.lowest is None or self._restarted or level != call.program.levels[0]:
             return False
         if not any(call.space.visible(level, cell) for cell in self._asleep):
             return False

@@ -22,10 +22,10 @@ from confab.planner.grounded.grounding import ground
 from confab.planner.grounded.hff import by_bit
 from confab.planner.grounded.shortest import Estimate, each_goal_alone, shortest
 from confab.planner.grounded.task import Task, bits_of
+from confab.planner.hierarchical.lowest_level import closed, refusal
 from confab.planner.hierarchical.planner import SEARCHING, Compiled, compiled
 from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.hierarchical.regrouping import under_the_levels_above
-from confab.planner.hierarchical.unsolvability import closed, refusal
 from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, UngroundableError
 from confab.planner.plan_costs import cost_of
 from confab.planner.validation import validate

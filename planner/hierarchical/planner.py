@@ -15,7 +15,8 @@ search_budget  the limits of one search
 few_steps      search for a few relevant steps
 relevance      the steps that begin chains towards wanted values
 scope          ground and search a part of the world, on one level
-unsolvability  prove that there is no plan, or find a plan of the lowest level, during planning
+unsolvability  prove that there is no plan, during planning
+lowest_level   search the lowest level as a whole, in turns with planning goal by goal
 shortening     make the plan cheaper: other orders of the goals, removal of detours, routes, windows
 windows        replace consecutive steps of a level by cheaper steps
 regrouping     find the upper-level steps that explain steps of a level
@@ -34,12 +35,11 @@ from time import perf_counter
 
 from confab.planner.hierarchical.agenda import Agenda
 from confab.planner.hierarchical.call import Call, Compiled, as_refined, compiled
+from confab.planner.hierarchical.lowest_level import CheapestPlanFoundError, LowestLevel
 from confab.planner.hierarchical.scope import BITS
 from confab.planner.hierarchical.shortening import DEFAULT_WORK, shortened
-from confab.planner.hierarchical.unsolvability import FINALLY, LOOKING, TURNS
-from confab.planner.hierarchical.windows import regroupings
+from confab.planner.hierarchical.unsolvability import FINALLY
 from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, UnsolvableError, paused_collection
-from confab.planner.plan_costs import cost_of
 from confab.planner.validation import validate
 from confab.reasoner.limits import LimitError, current, within
 from confab.reasoner.problem import Problem
@@ -137,12 +137,12 @@ def _plan(
     call.accepts = limits.accepts or call.accepts
     advised(call)
     levels = call.program.levels if leave_levels else call.program.levels[:1]
-    lowest = LowestLevelPlan(call, limits.end(SEARCHING))
-    agenda = Agenda(call, levels, found=lowest.offer if leave_levels else None)
+    lowest = LowestLevel(call, limits.end(SEARCHING), searched=leave_levels or len(problem.domain.levels) == 1)
+    done, why = False, ""
     try:
         resumed = first is not None and call.resume(first)
         more = resumed and call.achieved.keys() != call.goal.keys()
-        if more and not Agenda(call, levels, quickly=True, only_forward=True).achieve_all():
+        if more and not Agenda(call, levels, quickly=True).achieve_all():
             return call.outcome(Status.GAVE_UP, reason=Reason("a quick search found no steps that extend the plan"))
         done = resumed or (one_level and by_rules_alone(call))
         if one_level and not done:
@@ -156,12 +156,15 @@ def _plan(
                 call.steps, call.bound, done = as_refined(call, flat.plan.steps), flat.bound, True
             elif not vast:
                 done = without_grounding(call, TRIALS_AT_FIRST)
+        agenda = Agenda(call, levels, lowest=lowest)
         done = done or agenda.achieve_all()
-        why = "" if done else last_resort(agenda, limits, leave_levels, lowest)
+        why = "" if done else last_resort(agenda, limits, lowest)
     except UnsolvableError as proof:
         return replace(call.outcome(Status.UNSOLVABLE, reason=proof.reason), certificate=proof.certificate)
     except LimitError as limit:
         done, why = False, f"stopped at the limit: {limit}"
+    except CheapestPlanFoundError:
+        done = False
     if not done and lowest.plan is None:
         return no_plan(call, why)
     if not done:
@@ -185,65 +188,18 @@ def before_the_check(call: Call, until: float | None) -> float | None:
     return min(until, deadline.at - CHECKS * (perf_counter() - begin))
 
 
-class LowestLevelPlan:
-    """A plan of the lowest level that is found during planning goal by goal, which then goes on until the time `end` at most."""
-
-    def __init__(self, call: Call, end: float | None) -> None:
-        self.call, self.end = call, end
-        self.plan: Plan | None = None
-        self.cheapest = False
-
-    def offer(self, plan: Plan, cheapest: bool) -> bool:
-        """Group a plan under steps of the levels above and keep it; return whether it is a plan of the call's problem.
-
-        Planning goal by goal ends at once if the plan is a cheapest plan, and all its steps have been grouped under single steps of
-        the first level. Otherwise it goes on with as much work as it has done, and at least with the work `LOOKING`; with `TURNS`
-        times as much if the plan leaves a level.
-
-        Raises
-        ------
-        LimitError
-            Planning goal by goal ends at once, since the plan is the answer.
-        """
-        call, space = self.call, self.call.space
-        plans = regroupings(call.problem, plan, call.program.levels[-1], call.using)
-        found = next((one for one in plans if not validate(call.problem, one)), None)
-        if found is None:
-            return False
-        self.plan, self.cheapest, space.deadline = found, cheapest, self.end
-        stays = all(step.level == call.program.levels[0] for step in self.plan.steps)
-        space.most_work = min(space.most_work, space.worked + max(space.worked, LOOKING) * (1 if stays else TURNS))
-        if cheapest and stays and not any(step.joined for step in self.plan.steps):
-            space.most_work = 0
-            raise LimitError("a cheapest plan was found")
-        return True
-
-    def adopt(self) -> None:
-        """Replace the steps of the call by the plan."""
-        call, (first, *lower) = self.call, self.call.program.levels
-        assert self.plan is not None
-        call.steps, call.given_up, call.achieved = as_refined(call, self.plan.steps), [], dict(call.goal)
-        if self.cheapest:
-            call.bound = cost_of(call.problem, self.plan)
-        if any(step.level != first for step in self.plan.steps):
-            left, were = [first, *lower[:-1]], "were" if lower[1:] else "was"
-            call.given_up.append(
-                f"level{'s' * (len(left) > 1)} {', '.join(map(str, left))} {were} given up for the whole task"
-            )
-
-
-def last_resort(agenda: Agenda, limits: Limits, leave_levels: bool, lowest: LowestLevelPlan) -> str:
-    """Search the lowest level as a whole, unless `leave_levels` is false; return the reason why no plan is found."""
-    call, proofs, (first, *lower) = agenda.call, agenda.proofs, agenda.call.program.levels
-    proofs.certify(growth=FINALLY)
-    if lower and not leave_levels:
-        return f"no plan of level {first} was found that can be refined, and {NOT_LEFT}"
-    reason = proofs.search(BITS * limits.work, limits.expansions)
-    if proofs.too_large is None:
+def last_resort(agenda: Agenda, limits: Limits, lowest: LowestLevel) -> str:
+    """Search the lowest level as a whole, unless no level may be left; return the reason why no plan is found."""
+    call = agenda.call
+    agenda.proofs.certify(growth=FINALLY)
+    if not lowest.searched:
+        return f"no plan of level {call.program.levels[0]} was found that can be refined, and {NOT_LEFT}"
+    reason = lowest.search(BITS * limits.work, limits.expansions)
+    if lowest.too_large is None:
         return reason.text
     if without_grounding(call, TRIALS):
         lowest.offer(call.tree(), False)
-    return f"planning goal by goal found no plan, and {proofs.too_large.text}"
+    return f"planning goal by goal found no plan, and {lowest.too_large.text}"
 
 
 def is_vast(problem: Problem) -> bool:
@@ -273,7 +229,7 @@ def no_plan(call: Call, why: str) -> Outcome:
 
 def by_rules_alone(call: Call) -> bool:
     """Achieve all goals by learned rules if there are rules for all goals; return whether that succeeded."""
-    return call.advice is not None and call.advice.expects and Agenda(call, (), only_forward=True).achieve_all()
+    return call.advice is not None and call.advice.expects and Agenda(call, ()).achieve_all()
 
 
 def flat_first(problem: Problem, limits: Limits, deadline: float | None) -> Outcome:

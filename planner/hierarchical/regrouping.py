@@ -49,6 +49,14 @@ The instances differ in the individuals that the fact doesn't determine.
 """
 
 
+def regroupings(problem: Problem, plan: Plan, level: int, using: Compiled) -> tuple[Plan, ...]:
+    """Return two versions of a plan of one level: grouped under steps of the upper levels, and ungrouped.
+
+    For a plan of the most abstract level, return only this plan.
+    """
+    return (plan,) if level == problem.domain.levels[0] else (under_the_levels_above(problem, plan, using), plan)
+
+
 def under_the_levels_above(problem: Problem, plan: Plan, using: Compiled | None = None) -> Plan:
     """Return a plan in which runs of consecutive steps are grouped under steps of the levels above with the same effect.
 

@@ -25,7 +25,8 @@ from confab.planner.hierarchical.agenda import Agenda
 from confab.planner.hierarchical.call import Call, as_refined, fresh_call
 from confab.planner.hierarchical.detours import parts, without_detours
 from confab.planner.hierarchical.refinement import RefinedStep
-from confab.planner.hierarchical.windows import improves, lower_bound, primitives, regroupings, windowed
+from confab.planner.hierarchical.regrouping import regroupings
+from confab.planner.hierarchical.windows import improves, lower_bound, primitives, windowed
 from confab.planner.plan import Plan
 from confab.planner.plan_costs import compared
 from confab.planner.transitions import Cell, arguments_of, key_of
@@ -191,7 +192,7 @@ def reordered(call: Call, work: int, advised: Callable[[Call], None], random: Ra
         other.space.most_work = work
         advised(other)
         other.advice = None
-        agenda = Agenda(other, levels=call.program.levels[:1], quickly=True, only_forward=True)
+        agenda = Agenda(other, levels=call.program.levels[:1], quickly=True)
         with suppress(LimitError):
             if agenda.achieve_all() and cost(other) <= cost(call):
                 order[:] = other.achieved

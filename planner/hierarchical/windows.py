@@ -11,10 +11,11 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from confab.planner.hierarchical.agenda import Agenda
-from confab.planner.hierarchical.call import Call, Compiled, as_refined, fresh_call
+from confab.planner.hierarchical.call import Call, as_refined, fresh_call
 from confab.planner.hierarchical.detours import parts
 from confab.planner.hierarchical.inherited_preconditions import binding
 from confab.planner.hierarchical.refinement import RefinedStep
+from confab.planner.hierarchical.regrouping import regroupings
 from confab.planner.hierarchical.workspace import Ground
 from confab.planner.levels import levels_left
 from confab.planner.plan import Plan, UngroundableError
@@ -53,7 +54,7 @@ def replaced(call: Call, level: int, new: Sequence[Ground]) -> bool:
             return False
         other.steps.append(step)
     if not all(map(other.met, other.goal)):  # goals that the level doesn't see are open
-        Agenda(other, call.program.levels[:1], quickly=True, only_forward=True).achieve_all()
+        Agenda(other, call.program.levels[:1], quickly=True).achieve_all()
     problem, old = call.problem, call.tree()
     for plan in regroupings(problem, other.tree(), level, call.using):
         if improves(problem, plan, old, level) and not validate(problem, plan) and call.accepts(plan):
@@ -105,18 +106,6 @@ def small(call: Call, problem: Problem, level: int, most: int) -> Task | None:
     except UngroundableError:
         return None
     return task if isinstance(task, Task) else None
-
-
-def regroupings(problem: Problem, plan: Plan, level: int, using: Compiled) -> tuple[Plan, ...]:
-    """Return two versions of a plan of one level: grouped under steps of the upper levels, and ungrouped.
-
-    For a plan of the most abstract level, return only this plan.
-    """
-    if level == problem.domain.levels[0]:
-        return (plan,)
-    from confab.planner.hierarchical.regrouping import under_the_levels_above
-
-    return under_the_levels_above(problem, plan, using), plan
 
 
 def primitives(steps: Sequence[RefinedStep]) -> list[RefinedStep]:

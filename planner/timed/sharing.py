@@ -481,7 +481,7 @@ class _SharingSearch:
         self.spend(PLANNING)
         levels = problem.domain.levels
         leaves = any(step.level != levels[0] for step in self.plan.steps)
-        agenda = Agenda(call, levels if leaves else levels[:1], quickly=True, only_forward=True)
+        agenda = Agenda(call, levels if leaves else levels[:1], quickly=True)
         found = None
         with suppress(LimitError, UnsolvableError):
             if agenda.achieve_all():

@@ -11,11 +11,12 @@ import confab
 from confab.planner.grounded.best_first import plan_level
 from confab.planner.grounded.grounding import ground
 from confab.planner.grounded.task import Task
-from confab.planner.hierarchical.planner import Call, LowestLevelPlan, compiled
+from confab.planner.hierarchical.lowest_level import LowestLevel, exhausted
+from confab.planner.hierarchical.planner import Call, compiled
 from confab.planner.hierarchical.planner import plan as default
 from confab.planner.hierarchical.scope import LEAST
 from confab.planner.hierarchical.shortening import reordered
-from confab.planner.hierarchical.unsolvability import Proofs, exhausted
+from confab.planner.hierarchical.unsolvability import Proofs
 from confab.planner.levels import levels_left
 from confab.planner.paper.hierarchy import DOUBT
 from confab.planner.paper.hierarchy import plan as paper
@@ -195,7 +196,7 @@ def test_the_number_of_examined_states_grows_with_the_work_of_the_searches() -> 
             f"(define (problem p) (:domain lamps) (:objects {lamps} - lamp) (:init (even)) (:goal (and (odd) (even))))",
         )
     ).problem
-    proofs = Proofs(Call(problem, compiled(problem), None, 1))
+    proofs = Proofs(LowestLevel(Call(problem, compiled(problem), None, 1), searched=False))
     proofs.examine()  # the states are too many for a proof
     proofs.call.space.worked = 20_000 * LEAST
     with pytest.raises(UnsolvableError, match="none of all"):
@@ -205,23 +206,19 @@ def test_the_number_of_examined_states_grows_with_the_work_of_the_searches() -> 
 def test_a_plan_of_the_lowest_level_is_found_while_planning_goal_by_goal_goes_on(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    problem, found = tabletop(), list[tuple[Plan, bool]]()
-
-    def keep(plan: Plan, cheapest: bool) -> bool:
-        found.append((plan, cheapest))
-        return True
-
-    proofs = Proofs(Call(problem, compiled(problem), None, 1), found=keep)
-    works = 0
-    while not found:
+    problem = tabletop()
+    lowest = LowestLevel(Call(problem, compiled(problem), None, 1))
+    proofs, works = Proofs(lowest), 0
+    while lowest.plan is None:
         proofs.examine()
         works += 1
         proofs.call.space.worked = 2 * proofs.call.space.worked + 1
     monkeypatch.setattr("confab.planner.hierarchical.unsolvability.impossible", pytest.fail)
+    found = lowest.plan
     proofs.attempt()  # finds no further plan, and looks for no proof
-    ((plan, _),) = found
     assert works > 1
-    assert validate(problem, plan) == []
+    assert lowest.plan is found
+    assert validate(problem, found) == []
 
 
 def test_a_plan_of_the_lowest_level_is_shortened_for_all_goals_of_the_task() -> None:
@@ -230,8 +227,8 @@ def test_a_plan_of_the_lowest_level_is_shortened_for_all_goals_of_the_task() -> 
     call.achieved = dict(list(call.goal.items())[:2])  # planning goal by goal has achieved some of the goals
     flat = plan_level(problem, problem.domain.levels[-1])
     assert flat.plan is not None
-    lowest = LowestLevelPlan(call, None)
-    assert lowest.offer(flat.plan, False)
+    lowest = LowestLevel(call)
+    lowest.offer(flat.plan, False)
     lowest.adopt()
     reordered(call, 10**6, lambda _: None, Random(0))
     assert validate(problem, call.tree()) == []

@@ -11,18 +11,10 @@ from confab.planner.certificate_reasons import told
 from confab.planner.certifying import certify
 from confab.planner.grounded.grounding import ground
 from confab.planner.grounded.task import Task
+from confab.planner.hierarchical.lowest_level import LOOKING, LowestLevel, closed, exhausted, proved, refusal
 from confab.planner.hierarchical.planner import Call, compiled
 from confab.planner.hierarchical.scope import LEAST
-from confab.planner.hierarchical.unsolvability import (
-    EASIER,
-    LOOKING,
-    Proofs,
-    closed,
-    exhausted,
-    impossible,
-    proved,
-    refusal,
-)
+from confab.planner.hierarchical.unsolvability import EASIER, Proofs, impossible
 from confab.planner.plan import OUT_OF_MEMORY, Plan, Reason
 from confab.reasoner.amounts import Quantity
 from confab.reasoner.problem import Problem
@@ -405,7 +397,7 @@ def test_a_level_is_refused_for_more_changes_than_are_allowed() -> None:
 
 
 def test_a_level_that_is_too_large_says_so_and_proves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("confab.planner.hierarchical.unsolvability.MOST_ROWS", 2)
+    monkeypatch.setattr("confab.planner.hierarchical.lowest_level.MOST_ROWS", 2)
     said = proved(kitchen({"AT cup1": "sink"}), 1)
     assert isinstance(said, Reason)
     assert said.text.startswith("level 1 can't be grounded: ")
@@ -435,7 +427,7 @@ def test_states_are_examined_only_within_bounds_and_not_repeatedly(monkeypatch: 
     monkeypatch.setattr(
         "confab.planner.hierarchical.unsolvability.exhausted", lambda _, states, __: examined.append(states)
     )
-    proofs = Proofs(Call(problem, compiled(problem), None, 1))
+    proofs = Proofs(LowestLevel(Call(problem, compiled(problem), None, 1), searched=False))
     for work in (0, LOOKING, LOOKING * 3 // 2, 2 * LOOKING, 3 * LOOKING):
         proofs.call.space.worked = work // EASIER
         proofs.examine()

@@ -20,8 +20,8 @@ from confab.planner.experience.following import RulePolicy, rules_in
 from confab.planner.experience.lessons import compared, live, teach
 from confab.planner.experience.regression import PlanTrace
 from confab.planner.grounded.task import Task
+from confab.planner.hierarchical import lowest_level
 from confab.planner.hierarchical import planner as fast
-from confab.planner.hierarchical import unsolvability
 from confab.planner.hierarchical.call import Call, Compiled, compiled
 from confab.planner.hierarchical.operators import Program
 from confab.planner.hierarchical.workspace import EXPANSION
@@ -476,7 +476,7 @@ def test_goals_that_rules_have_reached_before_are_planned_without_a_search_for_a
     small, large = (confab.load(f"gallery-{size}").problem for size in ("small", "large"))
     experience = Experience("robot")
     teach(experience, small)
-    monkeypatch.setattr(unsolvability, "proved", proved)
+    monkeypatch.setattr(lowest_level, "proved", proved)
     assert plan(large, Advisor(experience)).plan is not None
     with pytest.raises(AssertionError, match="looked for a proof"):
         fast.plan(large, improve=0)  # its goals are achieved in series
