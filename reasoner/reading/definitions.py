@@ -24,7 +24,7 @@ the same with a static relation             `RelationCondition` instead of the `
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -75,7 +75,9 @@ AXIOMS = """{ ?situation :valueProperty ?node . ?node ?property ?value .
         || (?property = rdf:type && ?value IN (owl:TransitiveProperty, owl:SymmetricProperty, owl:ReflexiveProperty))) } UNION
     { ?situation :valueProperty ?value . ?node ?property ?value .
       FILTER(?property IN (rdfs:subPropertyOf, owl:equivalentProperty, owl:inverseOf))
-      FILTER(isIRI(?node)) } UNION
+      FILTER(isIRI(?node) || ?property != owl:inverseOf) } UNION
+    { ?situation :valueProperty/^rdfs:subPropertyOf ?node . ?node ?property ?value .
+      FILTER(?property = owl:inverseOf && isBlank(?node)) } UNION
     { ?situation :valueProperty/owl:propertyChainAxiom/rdf:rest* ?node . ?node ?property ?value .
       FILTER(?property IN (rdf:first, rdf:rest)) } UNION
     { ?situation :valueProperty/owl:propertyChainAxiom/rdf:rest*/rdf:first ?node . ?node ?property ?value .
@@ -147,6 +149,14 @@ class Definitions:
         while more := {iri for iri in defined.keys() - found if defined[iri] & (found | self.situations.keys())}:
             found |= more
         return frozenset(found)
+
+    def without_members(self, used: Collection[str]) -> Iterator[str]:
+        """Yield those classes in `used`, and in their definitions, of whose members OWL 2 RL and conditions may miss some."""
+        defined = {iri for iri, node in self.nodes.items() if not _blank(iri) and _DEFINED in node}
+        for iri in sorted(closure(used, lambda each: self._mentioned(each) if each in defined else ())):
+            inside = [self.nodes.get(node, {}) for node in self._expressions(iri)] if iri in defined else []
+            if not self.changes(iri) and any(CLOSED & said.keys() for said in inside):
+                yield iri
 
     @cached_property
     def _closed(self) -> frozenset[str]:
@@ -370,7 +380,11 @@ class Definitions:
             capital = name[0].upper() + name[1:]
             found = [said.get(OWL + one, [""])[0] for one in (name, f"min{capital}", f"max{capital}")]
             if any(found):
-                exactly, least, most = (int(one) if one.isdigit() else None for one in found)
+                if wrong := next((one for one in found if one and not one.isdecimal()), ""):
+                    raise KnowledgeError(
+                        f"the definition of a class counts up to '{wrong[:40]}' values; wanted a whole number"
+                    )
+                exactly, least, most = (int(one) if one else None for one in found)
                 if exactly is not None:
                     return exactly, exactly
                 return least or 0, most

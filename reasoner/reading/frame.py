@@ -112,7 +112,7 @@ def frame(
     nodes, supers = schema.nodes, schema.supers
     instances = [(individual, kind, index) for individual, kind, index in members if individual not in nodes]
     names = names_of(schema, instances, namesakes)
-    definitions = _definitions(schema, names)
+    definitions = definitions_of(schema, names)
     terms = set(schema.of_kind("Parameter", "Variable"))
     parts = Parts(nodes, names, terms, set(schema.pairs), definitions, schema.individuals_of)
     classes, parents = classes_of(instances, supers, names)
@@ -347,7 +347,7 @@ def _on_their_levels(
         yield replace(situation, level=max(known[each].level for each in read if each in known))
 
 
-def _definitions(schema: OntologySchema, names: Names) -> Definitions:
+def definitions_of(schema: OntologySchema, names: Names) -> Definitions:
     """Return the definitions of classes and situation types, with the domains and ranges of properties."""
     properties = {prop: (iri, iri not in schema.pairs) for prop, iri in schema.value_properties.items()}
     kinds: dict[str, tuple[str, str]] = {}

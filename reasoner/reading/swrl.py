@@ -122,10 +122,15 @@ class _Imp:
 
     def rules(self) -> Iterator[tuple[str, Rule]]:
         body = self._atoms("body")
+        self._check_arguments([*body, *self._atoms("head")])
         self._numbers(body)
         for atom in sorted(body, key=lambda atom: (len(atom[1]) != 1, self.definitions.changes(atom[0]))):
             self._said(*atom)  # class atoms come first and determine the classes of variables
-        for predicate, said in self._atoms("head"):
+        if not (head := self._atoms("head")):
+            raise self.error(
+                "it has no head, so it forbids its body; let a rule conclude a situation type, and state c:never true of that type"
+            )
+        for predicate, said in head:
             yield self._concluded(predicate, said)
 
     def error(self, what: str) -> KnowledgeError:
@@ -148,6 +153,7 @@ class _Imp:
     # ---------------------------------------------------------------------------------------------------------- reading
 
     def _atoms(self, part: str) -> list[Atom]:
+        """Return the atoms of the body or the head, sorted."""
         nodes = self.definitions.nodes
         found: list[Atom] = []
         for cell in _cells(nodes, nodes[self.iri].get(SWRL + part, ())):
@@ -166,6 +172,25 @@ class _Imp:
                 named = (*atom.get(SWRL + "classPredicate", ()), *atom.get(SWRL + "propertyPredicate", ()), other)
                 found.append((named[0], said))
         return sorted(found)
+
+    def _check_arguments(self, atoms: Sequence[Atom]) -> None:
+        """Raise `KnowledgeError` if an atom has the wrong number of arguments."""
+        definitions = self.definitions
+        for predicate, said in atoms:
+            known, many = predicate in definitions.situations or predicate in definitions.kinds, len(said)
+            if self._built_in(predicate, COMPUTES):
+                fits, wanted = (
+                    many == 3 or (many > 3 and local_name(predicate) in ("add", "multiply")),
+                    "a result and two numbers",
+                )
+            elif known or self._built_in(predicate, COMPARES) or predicate == BUILT_IN + "notEqual":
+                fits, wanted = many == 2, "two"
+            else:
+                fits, wanted = many > 0, "one or two"
+            if not fits:
+                raise self.error(
+                    f"{local_name(predicate)} has {many} argument{'s' * (many != 1)} there; wanted {wanted}"
+                )
 
     def _numbers(self, body: Sequence[Atom]) -> None:
         """Find the numeric expressions that the variables of the body denote."""

@@ -13,6 +13,7 @@ from confab.reasoner.derivation import needed
 from confab.reasoner.names import local_name
 from confab.reasoner.problem import Domain
 from confab.reasoner.reading.definitions import Definitions
+from confab.reasoner.reading.frame import definitions_of
 from confab.reasoner.reading.rows import OntologySchema
 from confab.reasoner.symbols import ClassCondition, Parameter, Rule, ValueCondition
 from confab.reasoner.validation.case import Fault, ReadCase
@@ -32,9 +33,19 @@ NOT_EVALUATED = {
 
 
 def definitions_without_effect(case: ReadCase) -> Iterator[Fault]:
-    """Find axioms about situation types that planning ignores, and stated facts about derived situation types."""
+    """Find axioms and definitions that planning ignores, and stated facts about derived situation types."""
     schema, names, rules = case.reading.schema, case.names, case.problem.domain.rules
-    of = schema.value_properties
+    of, relations = schema.value_properties, {*schema.of_kind("Relation", "ReachRelation")}
+    nodes = (*schema.nodes.values(), *schema.swrl.values())
+    used = {value for node in nodes for values in node.values() for value in values}
+    for iri in definitions_of(schema, names).without_members(used):
+        yield (
+            iri,
+            f"planning doesn't infer all members of {local_name(iri)}, since its definition has a negation, a number, 'only', "
+            "'Self' or a list of individuals, and isn't of the form 'SomeClass and (…)' with known properties",
+            "OWL 2 RL doesn't infer these members, so behaviours and rules about the class miss them",
+            "define it once, as 'SomeClass and (…)', with value properties, relations and amounts; or state its members",
+        )
     changed = {
         iri for effect in schema.of_kind("ValueEffect") for iri in schema.nodes[effect].get(CORE + "situationType", ())
     }
@@ -53,6 +64,25 @@ def definitions_without_effect(case: ReadCase) -> Iterator[Fault]:
             said, prop = f"{local_name(named)} is the inverse of {local_name(other)}", named
             if names.short(of[other]) in rules:
                 continue
+        elif named in of and other in of and predicate == OWL + "equivalentProperty":
+            said, prop = f"{local_name(named)} and {local_name(other)} are equivalent", named
+            if names.short(of[other]) in rules:
+                continue
+        for below, above in ((named, other), (other, named)):
+            if below not in of or above not in relations:
+                continue
+            mutual = (
+                predicate in (OWL + "equivalentProperty", OWL + "inverseOf") and names.short(of[below]) not in rules
+            )
+            if mutual or (below, predicate) == (named, RDFS + "subPropertyOf"):
+                how = "the inverse of " if predicate == OWL + "inverseOf" else ""
+                yield (
+                    below,
+                    f"planning doesn't evaluate that facts of {local_name(above)} follow from {how}{local_name(below)}, since "
+                    f"{local_name(above)} is a relation",
+                    "the facts of a relation are the same in every state, and don't follow from situations",
+                    f"make {local_name(above)} the value property of a situation type that no behaviour changes, or drop the axiom",
+                )
         if (
             said
             and names.short(of[prop]) not in rules

@@ -8,14 +8,16 @@ import pytest
 
 from confab.planner.solve import Request, solve
 from confab.planner.validation import LoggedState, validate
+from confab.reasoner.graph.inference import infer
 from confab.reasoner.graph.knowledge import KnowledgeError, load
 from confab.reasoner.reading.goals import with_goals
 from confab.reasoner.reading.problem import read
 from confab.reasoner.reading.relevance import recognise
 from confab.reasoner.symbols import EqualityCondition, RelationCondition, Rule, ValueCondition, Witness
+from confab.reasoner.validation.validate import validate as check
 from tests.planner import naive
 from worlds.derivations import NAMES, compared, derived, first_problem, in_state
-from worlds.entailed import CONCLUDED, DEFINED, PROPERTIES, domain, implies, random_state
+from worlds.entailed import CONCLUDED, DEFINED, PROPERTIES, atoms, domain, every, implies, random_state, some
 from worlds.owlapi import jars, jvm
 
 PUT = """
@@ -135,11 +137,61 @@ def test_amounts_are_computed_and_compared(yard: Yard, built_in: str, guarded: b
         (implies(":sees ?h ?x", ":knows ?h ?x"), "knows is neither the value property of a situation type nor a relation"),
         (counted("matches", "14"), "'by weight': planning doesn't evaluate swrlb:matches"),
         (counted("equal", "<urn:swrl:var#x>"), r"no atom determines the number \?x"),
+        (counted("equal", "14 15"), "equal has 3 arguments there; wanted two"),
+        (counted("subtract", ""), "subtract has 1 argument there; wanted a result and two numbers"),
+        (implies(":sees ?h ?x", ":Hand ?h", ":liesIn ?x"), "liesIn has 1 argument there; wanted two"),
+        (implies(":Cup ?x", ":liesIn ?x :box1").replace(atoms(":Cup ?x"), "rdf:nil"), "it has no head, so it forbids its body"),
     ],
 )  # fmt: skip
 def test_a_rule_that_planning_does_not_evaluate_is_refused_with_its_remedy(yard: Yard, more: str, said: str) -> None:
     with pytest.raises(KnowledgeError, match=said):
         read(load(yard(more)))
+
+
+def test_the_inverse_of_a_property_may_be_a_subproperty_of_a_defined_one(yard: Yard) -> None:
+    more = """[ owl:inverseOf :liesIn ] rdfs:subPropertyOf :hasIn . :hasIn a owl:ObjectProperty .
+        :HAS_IN a owl:Class, owl:NamedIndividual, c:SituationType ; c:valueProperty :hasIn .
+        :Place c:hasSituationType :HAS_IN . :Thing rdfs:subClassOf :HAS_IN ."""
+    path = yard(more)
+    infer(graph := load(path))
+    problem = read(graph).problem
+    state = LoggedState(problem, problem.initial)
+    assert state.value("HAS_IN", ("room1", "cup3")) == "true"
+    assert state.value("HAS_IN", ("room2", "cup3")) == "false"
+    assert "definition-without-effect" not in {finding.rule for finding in check([path])}
+
+
+NOT_CUP = "[ a owl:Class ; owl:complementOf :Cup ]"
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (":liesIn rdfs:subPropertyOf :near .", "facts of near follow from liesIn, since near is a relation"),
+        (":near owl:inverseOf :liesIn .", "facts of near follow from the inverse of liesIn"),
+        (":liesIn owl:equivalentProperty :cleanliness .", "liesIn and cleanliness are equivalent, since liesIn is functional"),
+        (f":Odd owl:equivalentClass {NOT_CUP} .", "all members of Odd"),
+        (f":Odd owl:equivalentClass [ a owl:Class ; owl:unionOf ( :Box {every(':Cup', NOT_CUP)} ) ] .", "all members of Odd"),
+        (f":Odd owl:equivalentClass {every(':Box', some(':knows', 'owl:allValuesFrom :Cup'))} .", "all members of Odd"),
+        (f":Odd owl:equivalentClass {every(':Box', NOT_CUP)}, {every(':Thing', NOT_CUP)} .", "all members of Odd"),
+        (f":Odd owl:equivalentClass {every(':Box', NOT_CUP)} .", ""),
+    ],
+)  # fmt: skip
+def test_an_axiom_that_planning_does_not_evaluate_is_an_error(yard: Yard, more: str, said: str) -> None:
+    uses = """:Odd a owl:Class, owl:NamedIndividual . :USED a owl:Class, owl:NamedIndividual, c:SituationType .
+        :Thing c:hasSituationType :USED . :USED.rule a owl:NamedIndividual, c:Rule ;
+        c:construct "CONSTRUCT { ?x :USED true } WHERE { ?x a :Odd }" ."""
+    findings = [one for one in check([yard(uses + more)]) if one.rule == "definition-without-effect"]
+    assert [one.what for one in findings if said in one.what] == [one.what for one in findings]
+    assert len(findings) == bool(said)
+
+
+@pytest.mark.parametrize("number", ["-1", '"several"'])
+def test_a_class_counts_whole_numbers(yard: Yard, number: str) -> None:
+    path = yard("")
+    path.write_text(path.read_text().replace('"2"^^xsd:nonNegativeInteger', number))
+    with pytest.raises(KnowledgeError, match=r"values; wanted a whole number"):
+        read(load(path))
 
 
 def test_a_class_counts_up_to_five(yard: Yard) -> None:
