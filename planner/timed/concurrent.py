@@ -14,6 +14,7 @@ ICAPS 2009.
 from __future__ import annotations
 
 import heapq
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -29,7 +30,7 @@ from confab.planner.grounded.task import Task
 from confab.planner.plan import OUT_OF_MEMORY, Counts, Limits, Outcome, Plan, Reason, Status, Step, UngroundableError
 from confab.planner.timed.activities import EventKind, StepEvent
 from confab.planner.timed.call import Timed, in_time
-from confab.planner.timed.envelopes import dominated, excluding, oversized
+from confab.planner.timed.envelopes import dominated, excluding, intersection, oversized
 from confab.planner.timed.pieces import duration_of
 from confab.planner.timed.plan import TimedOutcome
 from confab.planner.validation import Cell, LoggedState
@@ -278,7 +279,7 @@ class _SearchNode:
     state: int
     window: tuple[_SnapAction, ...]
     lasts: tuple[int, ...]
-    running: Mapping[int, int]  # the operator that ends a step, and the step's number in the window
+    running: Mapping[tuple[int, ...], int]  # the operators that can end a step, and the step's number in the window
     held: int  # bits that running steps require throughout their durations
 
 
@@ -301,17 +302,16 @@ class _Finder:
     def __post_init__(self) -> None:
         operators = range(len(self.task))
         self.named = [self.task.describe(one)[:2] for one in checked(operators, "naming the operators")]
-        self.end_of = {
-            (name.partition("@")[0], arguments): operator
-            for operator, (name, arguments) in enumerate(self.named)
-            if name.endswith(END)
-        }
+        self.ends_of = defaultdict[tuple[str, tuple[str, ...]], tuple[int, ...]](tuple)
+        for operator, (name, arguments) in enumerate(self.named):
+            if name.endswith(END):
+                self.ends_of[name.partition("@")[0], arguments] += (operator,)
         seconds = [self._seconds(*one) for one in checked(self.named, "finding the durations of the operators")]
         self.unit = Fraction(1, lcm(self.separation.denominator, *(s.denominator for s in seconds)))
         self.lasts = [int(s / self.unit) for s in seconds]
         self.apart = int(self.separation / self.unit)
         self.marks = sum(1 << bit for bit, fact in enumerate(self.task.facts) if _runs(fact) and fact.value == TRUE)
-        self.ends = [self.ending(one) if name.endswith(BEGIN) else None for one, (name, _) in enumerate(self.named)]
+        self.ends = [self.ending(one) if name.endswith(BEGIN) else () for one, (name, _) in enumerate(self.named)]
         self.oversized = oversized(self.task, self.ends, self.lasts, self.apart, self.held)
 
     def _seconds(self, name: str, arguments: tuple[str, ...]) -> Fraction:
@@ -344,10 +344,13 @@ class _Finder:
                 if whole is not None or first.status is not Status.SOLVED:
                     break
 
-    def ending(self, operator: int) -> int | None:
-        """Return the operator that ends the step begun by the given operator, or None if the step can't end."""
+    def ending(self, operator: int) -> tuple[int, ...]:
+        """Return the operators that can end the step to which an operator belongs.
+
+        There are several if the end has a condition with alternatives, or determines a variable.
+        """
         name, arguments = self.named[operator]
-        return self.end_of.get((name.partition("@")[0], arguments))
+        return self.ends_of[name.partition("@")[0], arguments]
 
     def completed(self, operators: list[int]) -> list[int] | None:
         """Return operators followed by the ends of the running steps, or None if an end is impossible or undoes a goal."""
@@ -357,10 +360,11 @@ class _Finder:
         open_ = dict.fromkeys(
             self.ending(operator) for operator in operators if self.named[operator][0].endswith(BEGIN)
         )
-        for operator in open_:
-            after = None if operator is None else self.task.applied(state, operator)
-            if operator is not None and after is not None and after & self.task.goal == self.task.goal:
-                state, operators = after, [*operators, operator]
+        for ends in open_:
+            afters = ((end, self.task.applied(state, end)) for end in ends)
+            made = [(end, after) for end, after in afters if after is not None]
+            for end, after in [one for one in made if one[1] & self.task.goal == self.task.goal][:1]:
+                state, operators = after, [*operators, end]
         return None if state & self.marks else operators
 
     def in_time(self) -> Iterator[list[int]]:
@@ -407,13 +411,13 @@ class _Finder:
 
     def key(self, node: _SearchNode) -> _StateKey:
         """Return the identity of a node: the state, and the `waiting` time of each running step."""
-        busy = sorted((end, self.waiting(node, step)) for end, step in node.running.items())
+        busy = sorted((ends[0], self.waiting(node, step)) for ends, step in node.running.items())
         return node.state, tuple(number for pair in busy for number in pair)
 
     def waiting(self, node: _SearchNode, step: int) -> int:
         """Return the minimum time from the begin of a running step to the events that its end must wait for."""
-        end = next(operator for operator, its in node.running.items() if its == step)
-        times = self.times(node, {end: step})
+        ends = next(ends for ends, its in node.running.items() if its == step)
+        times = self.times(node, {ends: step})
         return 0 if times is None else times[-1]
 
     def after(self, node: _SearchNode, operator: int) -> _SearchNode | None:
@@ -430,21 +434,21 @@ class _Finder:
         name = self.named[operator][0]
         running, lasts, window = dict(node.running), node.lasts, node.window
         if name.endswith(END):
-            step = running.pop(operator)
+            step = running.pop(self.ending(operator))
             window = (*window, _SnapAction(step, False, True, reads, writes))
         else:
             begins = name.endswith(BEGIN)
             step, lasts = len(lasts), (*lasts, self.lasts[operator])
             window = (*window, _SnapAction(step, True, not begins, reads, writes))
             if begins:
-                end = self.ending(operator)
-                if end is None:
+                ends = self.ending(operator)
+                if not ends:
                     return None
-                running[end] = step
+                running[ends] = step
         held = 0
-        for end in running:
-            held |= self.held(end)
-        kept = node.held & ~self.held(operator) if name.endswith(END) else node.held
+        for ends in running:
+            held |= self.held(ends)
+        kept = node.held & ~self.held(self.ending(operator)) if name.endswith(END) else node.held
         if kept & ~state:
             return None
         if not running:
@@ -486,20 +490,21 @@ class _Finder:
             found |= 1 << self.places.setdefault(cell, len(self.places))
         return found
 
-    def held(self, end: int) -> int:
-        """Return the bits that the end of a running step requires, or 0 if the behaviour has separate conditions at its end."""
-        whole = self.cut.whole.domain.behaviors[self.named[end][0].partition("@")[0]]
-        return 0 if timing_of(whole).asked(Span.END) else self.task.changes_of(end)[0]
+    def held(self, ends: tuple[int, ...]) -> int:
+        """Return the bits that every end of a running step requires, or 0 if the behaviour has separate conditions at its end."""
+        whole = self.cut.whole.domain.behaviors[self.named[ends[0]][0].partition("@")[0]]
+        return 0 if timing_of(whole).asked(Span.END) else intersection(self.task.changes_of(end)[0] for end in ends)
 
-    def times(self, node: _SearchNode, ending: Mapping[int, int]) -> list[int] | None:
+    def times(self, node: _SearchNode, ending: Mapping[tuple[int, ...], int]) -> list[int] | None:
         """Return the earliest begin of each step of a node, given that the running steps in `ending` end in any order.
 
         The last entry is the time from the begin of the first ending step to the events that its end must wait for. Return None if
         a step would end too late.
         """
         events = list(node.window)
-        for end, step in ending.items():
-            events.append(_SnapAction(step, False, True, *self.access(end)))
+        for ends, step in ending.items():
+            reads, writes = map(intersection, zip(*map(self.access, ends), strict=True))
+            events.append(_SnapAction(step, False, True, reads, writes))
         arcs: list[tuple[int, int, int]] = []
         lasts = node.lasts
         for j, later in enumerate(events):

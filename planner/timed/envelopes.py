@@ -7,9 +7,11 @@ lies within one envelope: two envelopes in sequence leave a gap, and if two over
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Sequence, Set
+from collections.abc import Callable, Iterable, Sequence, Set
 from dataclasses import replace
+from functools import reduce
 from math import inf
+from operator import and_
 from typing import TypeAlias
 
 import numpy as np
@@ -17,35 +19,42 @@ import numpy as np
 from confab.planner.grounded.derived_arrays import union
 from confab.planner.grounded.task import BitChange, Task, bits_of, grouped
 
-Ends: TypeAlias = "Sequence[int | None]"
-"""For each operator, the operator that ends the step if the operator begins a step."""
+Ends: TypeAlias = "Sequence[tuple[int, ...]]"
+"""For each operator, the operators that can end the step if the operator begins a step."""
 
 
-def oversized(task: Task, ends: Ends, lasts: Sequence[int], apart: int, held: Callable[[int], int]) -> set[int]:
+def intersection(masks: Iterable[int]) -> int:
+    """Return the bits that all of one or more masks have."""
+    return reduce(and_, masks)
+
+
+def oversized(
+    task: Task, ends: Ends, lasts: Sequence[int], apart: int, held: Callable[[tuple[int, ...]], int]
+) -> set[int]:
     """Return the begins of steps that are too long for every envelope of a bit that they require throughout.
 
     Parameters
     ----------
     task : Task
-    ends : sequence of int or None
+    ends : sequence of tuple of int
     lasts : sequence of int
         The duration of each operator's step.
     apart : int
         The minimum time between conflicting events.
-    held : function of an operator
-        Function that returns the bits that a step requires throughout its duration, given the step's end.
+    held : function of operators
+        Function that returns the bits that a step requires throughout its duration, given the step's possible ends.
     """
     longest = defaultdict[int, float](float)
-    for operator, end in enumerate(ends):
-        changes = () if end is None else task.changes_of(end)[1]
-        closed = union(cleared & ~set_ for when, cleared, set_ in changes if not when)
+    for operator, its in enumerate(ends):
+        changes = [task.changes_of(end)[1] for end in its]
+        closed = [union(cleared & ~set_ for when, cleared, set_ in made if not when) for made in changes] or [0]
         for bit in bits_of(task.set_by(operator)):
-            longest[bit] = max(longest[bit], lasts[operator] if closed >> bit & 1 else inf)
+            longest[bit] = max(longest[bit], lasts[operator] if intersection(closed) >> bit & 1 else inf)
     return {
         operator
-        for operator, end in enumerate(ends)
-        if end is not None
-        for bit in bits_of(held(end) & ~task.initial & ~task.set_by(operator))
+        for operator, its in enumerate(ends)
+        if its
+        for bit in bits_of(held(its) & ~task.initial & ~task.set_by(operator))
         if bit in longest and lasts[operator] + 2 * apart > longest[bit]
     }
 
@@ -56,9 +65,9 @@ def dominated(task: Task, ends: Ends, lasts: Sequence[int], running: int) -> set
     What fits into the shorter step also fits into the longer one. `running` has the bits that tell which steps are running.
     """
     alike = defaultdict[object, list[int]](list)
-    for operator, end in enumerate(ends):
-        if end is not None and not (task.amounts and (task.amounts.made(operator) or task.amounts.made(end))):
-            alike[_without(task, operator, running), _without(task, end, running)].append(operator)
+    for operator, its in enumerate(ends):
+        if its and not (task.amounts and any(task.amounts.made(one) for one in (operator, *its))):
+            alike[tuple(_without(task, one, running) for one in (operator, *its))].append(operator)
     found = set[int]()
     for group in alike.values():
         longest = max(lasts[one] for one in group)

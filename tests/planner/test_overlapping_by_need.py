@@ -35,6 +35,7 @@ from confab.reasoner.symbols import (
     Symbol,
     Timing,
     ValueEffect,
+    Witness,
 )
 from confab.reasoner.timing import by_events, projected
 from worlds.timed import Action, TimedWorld, least_makespan, problem_of
@@ -347,6 +348,25 @@ def test_validation_accepts_a_step_that_gives_itself_what_it_needs(tmp_path: Pat
     assert not [one for one in confab.validate(tmp_path / "jars.ttl") if "never applicable" in str(one)]
     result = confab.load(tmp_path / "jars.ttl").plan("jar CLOSED true", time_limit=20)
     assert [step.behavior for step in result.plan.primitives] == ["PRESS"]
+
+
+def test_a_condition_at_the_end_of_a_step_can_have_several_witnesses() -> None:
+    given = (Span.START, becomes("N", "?t", TRUE)), (Span.END, becomes("P", "?t", TRUE))
+    some = Witness("?u", "T", (has("G", "?u", TRUE),))
+    asked: dict[str, Asked] = {"AWAIT": ((Span.END, some),), "GIVE": ((Span.START, has("N", "?t", TRUE)),)}
+    made = {"AWAIT": given, "GIVE": ((Span.END, becomes("G", "?t", TRUE)),)}
+    behaviors = [
+        replace(
+            behavior(name, 1, "?t:T", projected(its, made[name])[0], [e for _, e in made[name]]),
+            timing=Timing(Fraction(len(name)), (), its, made[name]),
+        )
+        for name, its in asked.items()
+    ]
+    kinds = [SituationType(name, ("T",), "Truth", boolean=True) for name in "PGN"]
+    problem = world(kinds, behaviors, {"T": ("t", "u")}, {}, {"P t": TRUE})
+    timed = schedule_of(solve(Request(problem, limits=Limits(seconds=10.0))))
+    assert timed is not None
+    assert validate_timed(problem, timed) == []
 
 
 def test_a_task_of_several_levels_whose_steps_have_spans_is_proved_unsolvable() -> None:
