@@ -15,6 +15,8 @@ from confab.planner.solve import Request, solve
 from confab.planner.timed.call import best_in_time
 from confab.planner.timed.plan import TimedPlan, schedule_of
 from confab.planner.timed.validation import validate_in_sequence, validate_timed
+from confab.reasoner.aggregates.compiling import compiled
+from confab.reasoner.aggregates.totals import with_totals
 from confab.reasoner.amounts import Amount, Quantity
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse
@@ -23,6 +25,7 @@ from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
+    Aggregate,
     AmountEffect,
     Behavior,
     Comparison,
@@ -367,6 +370,31 @@ def test_a_condition_at_the_end_of_a_step_can_have_several_witnesses() -> None:
     timed = schedule_of(solve(Request(problem, limits=Limits(seconds=10.0))))
     assert timed is not None
     assert validate_timed(problem, timed) == []
+
+
+def test_a_count_follows_a_fact_that_a_step_gives_itself_for_its_condition_throughout() -> None:
+    asked: dict[str, Asked] = {
+        "LIGHT": ((Span.THROUGHOUT, has("P", "t", TRUE)), (Span.END, has("G", "t", TRUE))),
+        "SEE": ((Span.START, Comparison(Amount("MANY", ()), ">=", Fraction(1))),),
+    }
+    made: dict[str, Made] = {
+        "LIGHT": ((Span.START, becomes("P", "t", TRUE)), (Span.END, becomes("N", "t", TRUE))),
+        "SEE": ((Span.END, becomes("G", "t", TRUE)),),
+    }
+    timings = {name: Timing(Fraction(len(name)), (), its, made[name]) for name, its in asked.items()}
+    behaviors = [
+        replace(behavior(name, 1, "", *projected(its, made[name])), timing=timings[name])  # type: ignore[arg-type]
+        for name, its in asked.items()
+    ]
+    kinds = [SituationType(name, ("T",), "Truth", boolean=True) for name in "PGN"]
+    kinds += [SituationType("MANY", (), "MANY", quantity=Quantity())]
+    problem = world(kinds, behaviors, {"T": ("t", "u")}, {}, {"N t": TRUE})
+    count = Aggregate("MANY", "count", Fraction(1), (), (Parameter("?x", "T"),), (has("P", "?x", TRUE),))
+    domain = compiled(replace(problem.domain, aggregates={"MANY": count}), problem.classes)
+    problem = replace(problem, domain=domain, initial=with_totals(domain, problem.classes, {}, problem.initial))
+    timed = schedule_of(solve(Request(problem, limits=Limits(seconds=10.0))))
+    assert timed is not None
+    assert timed.makespan == len("LIGHT")
 
 
 def test_a_task_of_several_levels_whose_steps_have_spans_is_proved_unsolvable() -> None:
