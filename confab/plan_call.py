@@ -1,13 +1,13 @@
 """One planning call: the task is read, searched and, if necessary, scheduled.
 
 ```text
-read_task     read the individuals that the task can need, or the whole scene
-planned       if steps must overlap, plan with times
-              otherwise search; if the part of the scene has no valid plan, search in the whole scene
-              schedule the plan, or plan with times if steps may have to overlap
-in_time       schedule the plan; with a time limit, then shorten the plan as long as its schedule keeps all deadlines
-searched      choose among the soft goals; each choice is a search
-search        the engine that the caller names, or Confab's own search and then an installed engine
+read_task          read the individuals that the task can need, or the whole scene
+plan_task          if steps must overlap, plan with times
+                   otherwise search; if the part of the scene has no valid plan, search in the whole scene
+                   schedule the plan, or plan with times if steps may have to overlap
+in_time            schedule the plan; with a time limit, then shorten the plan as long as its schedule keeps all deadlines
+choose_and_search  choose among the soft goals; each choice is a search
+search             the engine that the caller names, or Confab's own search and then an installed engine
 ```
 """
 
@@ -165,7 +165,7 @@ def read_task(
     return PlanningTask(scene, goals, memory, options, deadline, reading, problem, grounds, checking)
 
 
-def planned(task: PlanningTask) -> Found:
+def plan_task(task: PlanningTask) -> Found:
     """Plan, and schedule the plan if the task asks for times."""
     problem, part = task.problem, None if task.reading.whole else task.reading
     faulty = [*never_done(problem)]
@@ -181,15 +181,15 @@ def planned(task: PlanningTask) -> Found:
     if asks_for_times(problem, task.options.minimise):
         import_module("confab.planner.timed.call")  # the search has a share of the time that is left afterwards
     if faulty:
-        problem, outcome = searched_without(task, problem, faulty)
+        problem, outcome = choose_without(task, problem, faulty)
     else:
-        problem, outcome = searched(task, problem)
+        problem, outcome = choose_and_search(task, problem)
     try:
         if part is not None and needs_the_whole_scene(task, outcome):
             whole = task.whole()
             if whole != task.problem:
                 part = None
-                problem, outcome = searched(task, whole)
+                problem, outcome = choose_and_search(task, whole)
     except OutOfTimeError as error:
         if outcome.plan is None:
             raise
@@ -252,7 +252,7 @@ def needs_the_whole_scene(task: PlanningTask, outcome: Outcome) -> bool:
     return bool(plan and refused(knowledge, task.reading, plan, task.goals, outcome.unmet))
 
 
-def searched_without(
+def choose_without(
     task: PlanningTask, problem: Problem, faulty: Sequence[tuple[Behavior, str]]
 ) -> tuple[Problem, Outcome]:
     """Search without behaviours that no plan can contain; if there is no plan without them, the first reason is an error."""
@@ -262,7 +262,7 @@ def searched_without(
     leaves = task.options.leave_levels and task.options.strategy != "paper"
     if not leaves and none_at_all(possible, task.deadline):
         raise error
-    chosen, outcome = searched(task, possible)
+    chosen, outcome = choose_and_search(task, possible)
     if leaves and outcome.status is Status.UNSOLVABLE:
         raise error
     if outcome.status is Status.GAVE_UP and outcome.reason:
@@ -282,7 +282,7 @@ def none_at_all(problem: Problem, deadline: Deadline) -> bool:
 # ------------------------------------------------------------------------------------------------------------- searching
 
 
-def searched(task: PlanningTask, problem: Problem) -> tuple[Problem, Outcome]:
+def choose_and_search(task: PlanningTask, problem: Problem) -> tuple[Problem, Outcome]:
     """Search, and choose among soft goals; return the problem with the chosen goals, and the outcome."""
     mode = task.options.strategy
     if not problem.weights:

@@ -16,7 +16,7 @@ from confab.checking import refused
 from confab.formats import ResultJson
 from confab.interchange import outcome_json
 from confab.known import Known
-from confab.plan_call import PlanningTask, Searching, own_request, planned, read_task
+from confab.plan_call import PlanningTask, Searching, own_request, plan_task, read_task
 from confab.plan_options import PlanOptions
 from confab.planner.plan import Forgone, Outcome, Plan, SoftGoal, Status, Step, paused_collection, renumbered
 from confab.planner.plan_costs import stated_cost
@@ -138,7 +138,7 @@ def plan_by(scene: Known, goals: list[str], options: PlanOptions, choosing: bool
         task = read_task(scene, goals, memory, options, deadline)
         quantified = perf_counter() - begin
         check_goal(scene.iri, task.problem)
-        found = planned(replace(task, choosing=choosing))
+        found = plan_task(replace(task, choosing=choosing))
         seconds = {**scene.seconds, "quantify": quantified}
         queries = scene.knowledge.round_trips - asked
         return Result(

@@ -87,8 +87,8 @@ def within(limit: Deadline | float | None) -> Iterator[Deadline]:
 
 
 @contextmanager
-def overtime(share: float = 0.08) -> Iterator[Deadline]:
-    """Extend the deadline by a share of the time limit (at least 0.1 s), so that a result that was found in time can be checked.
+def overtime() -> Iterator[Deadline]:
+    """Extend the deadline by 8 % of the time limit (at least 0.1 s), so that a result that was found in time can be checked.
 
     The deadline isn't extended further if it has already passed.
 
@@ -99,7 +99,7 @@ def overtime(share: float = 0.08) -> Iterator[Deadline]:
     True
     """
     now = _current.get()
-    later = now if math.isinf(now.at) else Deadline(now.at + max(share * now.seconds, 0.1), now.seconds)
+    later = now if math.isinf(now.at) else Deadline(now.at + max(0.08 * now.seconds, 0.1), now.seconds)
     token = _current.set(later)
     try:
         yield later

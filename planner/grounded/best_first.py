@@ -30,7 +30,6 @@ from confab.planner.grounded.task import Task
 from confab.planner.plan import OUT_OF_MEMORY, Counts, Limits, Outcome, Plan, Reason, Status, UngroundableError
 from confab.reasoner.limits import OutOfTimeError
 from confab.reasoner.problem import Problem
-from confab.reasoner.symbols import State
 
 BASE_WORK, STEP_WORK, STEPS_COUNTED, SEARCH_SHARE = 200_000, 1_000, 400, 50
 """Constants that determine the maximum work of shortening a plan; the unit is one examined operator.
@@ -57,21 +56,16 @@ class Flat:
 def plan_level(
     problem: Problem,
     level: int | None = None,
-    initial: State | None = None,
-    goal: State | None = None,
     limits: Limits = Limits(),  # noqa: B008 - frozen
     most_work: float = math.inf,
     most_rows: int | None = None,
 ) -> Outcome:
-    """Plan one level of a problem, by default the lowest level.
+    """Plan one level of a problem, by default the lowest level; symbols that are initially at rest are at rest in the end.
 
     Parameters
     ----------
     problem : Problem
     level : int, optional
-    initial, goal : State, optional
-        By default, the initial state and the goal of the problem; the default goal includes the rest values of symbols that are
-        initially at rest.
     limits : Limits
         Maximum number of expansions by h_FF, and maximum time in seconds, including grounding.
     most_work : float
@@ -87,9 +81,8 @@ def plan_level(
     began = perf_counter()
     deadline = limits.end()
     level = problem.domain.levels[-1] if level is None else level
-    goal = problem.goal_on(level) if goal is None else goal
     try:
-        task = ground(problem, level, initial, goal, most_rows or MOST_ROWS, deadline)
+        task = ground(problem, level, None, problem.goal_on(level), most_rows or MOST_ROWS, deadline)
     except (UngroundableError, OutOfTimeError) as error:
         return Outcome(Status.GAVE_UP, reason=Reason(f"grounding stopped: {error}"), seconds=perf_counter() - began)
     except MemoryError:

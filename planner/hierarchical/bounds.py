@@ -18,15 +18,14 @@ from contextlib import suppress
 from dataclasses import replace
 from time import perf_counter
 
-from confab.planner.grounded.grounding import ground
 from confab.planner.grounded.hff import by_bit
 from confab.planner.grounded.shortest import Estimate, each_goal_alone, shortest
 from confab.planner.grounded.task import Task, bits_of
-from confab.planner.hierarchical.lowest_level import closed, refusal
+from confab.planner.hierarchical.lowest_level import proved
 from confab.planner.hierarchical.planner import SEARCHING, Compiled, compiled
 from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.hierarchical.regrouping import under_the_levels_above
-from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, UngroundableError
+from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, UnsolvableError
 from confab.planner.plan_costs import cost_of
 from confab.planner.validation import validate
 from confab.reasoner.limits import LimitError, OutOfTimeError
@@ -92,13 +91,13 @@ def _proved(problem: Problem, best: Outcome, limits: Limits, deadline: float | N
     problem = replace(problem, goal=problem.goal_on(level))
     upper = cost_of(problem, best.plan) if best.plan is not None else math.inf
     try:
-        if refusal(closed(problem, level, deadline)) is not None:
-            return 0.0, None
-        task = ground(problem, level, deadline=deadline)
-    except (UngroundableError, OutOfTimeError):
+        task = proved(problem, level, deadline)
+    except UnsolvableError:
+        return math.inf, None
+    except OutOfTimeError:
         return 0.0, None
     if isinstance(task, Reason):
-        return math.inf, None
+        return 0.0, None
     lower = 0.0
     half = None if deadline is None else (perf_counter() + deadline) / 2
     for bound, most, until in (

@@ -17,7 +17,7 @@ from confab.planner.plan import OUT_OF_MEMORY, Plan, Reason, Status, Ungroundabl
 from confab.planner.plan_costs import cost_of
 from confab.planner.validation import validate
 from confab.reasoner.problem import Problem
-from confab.reasoner.symbols import Fact, State
+from confab.reasoner.symbols import Fact
 
 if TYPE_CHECKING:
     from confab.planner.grounded.best_first import Search
@@ -147,14 +147,11 @@ class LowestLevel:
             )
 
 
-def closed(problem: Problem, level: int, deadline: float | None, initial: State | None = None) -> Reached:
-    """Return the facts of a level that are reachable under delete relaxation from `initial`.
-
-    By default, `initial` is the initial state of the problem.
-    """
+def closed(problem: Problem, level: int, deadline: float | None) -> Reached:
+    """Return the facts of a level that are reachable under delete relaxation."""
     from confab.planner.grounded import reachability
 
-    reached = reachability.Reached(problem, level, problem.initial if initial is None else initial, MOST_ROWS, deadline)
+    reached = reachability.Reached(problem, level, problem.initial, MOST_ROWS, deadline)
     reached.close()
     return reached
 

@@ -122,10 +122,8 @@ def _plan(
     first: Outcome | None,
 ) -> Outcome:
     deadline, until = limits.end(SEARCHING * limits.finding), limits.end(SHORTENING)
-    one_level = improve > 0 and len(problem.domain.levels) == 1
-    vast = one_level and is_vast(problem)
-    flat = None
-    if one_level and not vast and advised is without_advice and first is None:
+    one_level, flat = improve > 0 and len(problem.domain.levels) == 1, None
+    if one_level and not is_vast(problem) and advised is without_advice and first is None:
         flat = flat_first(problem, limits, deadline)  # saves compiling thousands of conditional effects
         if flat.status is Status.SOLVED and deadline is None:
             return flat
@@ -137,28 +135,21 @@ def _plan(
     call.accepts = limits.accepts or call.accepts
     advised(call)
     levels = call.program.levels if leave_levels else call.program.levels[:1]
-    lowest = LowestLevel(call, limits.end(SEARCHING), searched=leave_levels or len(problem.domain.levels) == 1)
+    lowest = LowestLevel(
+        call, limits.end(SEARCHING), searched=leave_levels or len(levels) == len(problem.domain.levels)
+    )
     done, why = False, ""
     try:
-        resumed = first is not None and call.resume(first)
-        more = resumed and call.achieved.keys() != call.goal.keys()
-        if more and not Agenda(call, levels, quickly=True).achieve_all():
-            return call.outcome(Status.GAVE_UP, reason=Reason("a quick search found no steps that extend the plan"))
-        done = resumed or (one_level and by_rules_alone(call))
-        if one_level and not done:
-            done = vast and without_grounding(call, TRIALS_AT_FIRST)
-        if one_level and not done:
-            flat = flat or flat_first(problem, limits, deadline)
-            call.count(flat)
-            if flat.status is Status.UNSOLVABLE or (flat.status is Status.SOLVED and deadline is None):
-                return replace(call.outcome(flat.status, flat.plan, flat.reason), bound=flat.bound)
-            if flat.plan is not None:
-                call.steps, call.bound, done = as_refined(call, flat.plan.steps), flat.bound, True
-            elif not vast:
-                done = without_grounding(call, TRIALS_AT_FIRST)
-        agenda = Agenda(call, levels, lowest=lowest)
-        done = done or agenda.achieve_all()
-        why = "" if done else last_resort(agenda, limits, lowest)
+        if first is not None and call.resume(first):
+            done = True
+            if call.achieved.keys() != call.goal.keys() and not Agenda(call, levels, quickly=True).achieve_all():
+                return call.outcome(Status.GAVE_UP, reason=Reason("a quick search found no steps that extend the plan"))
+        elif one_level and as_a_whole(call, limits, deadline, flat):
+            done, improve = True, improve if call.bound is None or deadline is not None else 0  # a flat plan is short
+        else:
+            agenda = Agenda(call, levels, lowest=lowest)
+            done = agenda.achieve_all()
+            why = "" if done else last_resort(agenda, limits, lowest)
     except UnsolvableError as proof:
         return replace(call.outcome(Status.UNSOLVABLE, reason=proof.reason), certificate=proof.certificate)
     except LimitError as limit:
@@ -227,9 +218,25 @@ def no_plan(call: Call, why: str) -> Outcome:
     return call.outcome(Status.GAVE_UP, reason=gave_up(call, why))
 
 
-def by_rules_alone(call: Call) -> bool:
-    """Achieve all goals by learned rules if there are rules for all goals; return whether that succeeded."""
-    return call.advice is not None and call.advice.expects and Agenda(call, ()).achieve_all()
+def as_a_whole(call: Call, limits: Limits, deadline: float | None, flat: Outcome | None) -> bool:
+    """Plan a problem of one level as a whole with bounded work; return whether the steps of the call are a plan now.
+
+    If there are rules for all goals, they come first. A grounded search follows (`flat` is its outcome if it has been made), and a
+    search without grounding, which precedes the grounded one if the problem is vast.
+    """
+    if call.advice is not None and call.advice.expects and Agenda(call, ()).achieve_all():
+        return True
+    vast = is_vast(call.problem)
+    if vast and without_grounding(call, TRIALS_AT_FIRST):
+        return True
+    flat = flat or flat_first(call.problem, limits, deadline)
+    call.count(flat)
+    if flat.status is Status.UNSOLVABLE and flat.reason is not None:
+        raise UnsolvableError(flat.reason)
+    if flat.plan is None:
+        return not vast and without_grounding(call, TRIALS_AT_FIRST)
+    call.steps, call.bound = as_refined(call, flat.plan.steps), flat.bound
+    return True
 
 
 def flat_first(problem: Problem, limits: Limits, deadline: float | None) -> Outcome:
