@@ -44,12 +44,14 @@ SHARES = {
     "ternary": 0.1,
     "overlapping": 0.15,
     "extended": 0.1,
+    "local": 0.15,
 }
 """Shares of worlds with a constraint on every state, with situation types that define each other, with costs that depend on
 amounts, with a goal about all individuals of a class, with behaviours that change a situation type by several effects, with
 totals of totals, with goals that exclude a value or an amount, with soft goals that aren't among the goals, with several
 constraints on every state or on the order of states, with numbers that only some pairs have, with situation types of three
-arguments, with classes that share individuals or are defined, and with behaviours that extend others."""
+arguments, with classes that share individuals or are defined, with behaviours that extend others, and with variables that are
+local to groups of conditions or to effects."""
 SHRUNK = 2
 """Number of worlds that each process shrinks for each kind of fault."""
 SHOWN, MUTANTS = 6, 100

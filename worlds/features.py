@@ -26,7 +26,7 @@ from confab.reasoner.symbols import (
 )
 from worlds.interpreter import Interpreter, TooManyStatesError
 from worlds.mixed import RandomWorld
-from worlds.phrases import ANYONE, EACH
+from worlds.phrases import ANYONE, EACH, LOCAL
 from worlds.shrinking import without_individual
 
 MOST = 2_000
@@ -164,6 +164,9 @@ FEATURES: Mapping[str, Callable[[RandomWorld], Problem]] = {
     "conditions on individuals by name": _without_conditions(lambda world, one: _by_name(one)),
     "some individual": _without_conditions(
         lambda world, one: isinstance(one, Witness) and one.variable not in (EACH, ANYONE)
+    ),
+    "variables local to a group": _without_conditions(
+        lambda world, one: isinstance(one, Witness) and one.variable.startswith(LOCAL)
     ),
     "no individual": _without_conditions(lambda world, one: isinstance(one, Witness) and one.variable == ANYONE),
     "all of a class": _without_conditions(lambda world, one: isinstance(one, Witness) and one.variable == EACH),

@@ -9,7 +9,7 @@ search by `worlds.interpreter`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import product
@@ -46,7 +46,7 @@ from confab.reasoner.symbols import (
 from worlds.constraining import with_constraints
 from worlds.interpreter import Interpreter, State, TooManyStatesError
 from worlds.kinds import describe, overlapping
-from worlds.phrases import HIGHEST, Phrases, Vocabulary, contrary, named
+from worlds.phrases import HIGHEST, LOCAL, Phrases, Vocabulary, contrary, named
 from worlds.tuples import numbers_of_some, of_three
 from worlds.wishes import Wish, wishes
 
@@ -78,9 +78,9 @@ class RandomWorld:
 
     `pairs` are the situation types whose property takes several values. `owners` maps each situation type to the classes that
     have it. `axioms` has the property axioms that define situation types instead of rules. `updates` are the behaviours that are
-    written as SPARQL updates; with `extending`, an update may extend another one. `definitions` has the OWL expressions of
-    classes, and `described` the conditions on a member of a class that situations define. `wishes` are further goals, which only
-    the task with soft goals has.
+    written as SPARQL updates; with `extending`, an update may extend another one. With `queries`, some rules are written as SPARQL
+    queries. `definitions` has the OWL expressions of classes, and `described` the conditions on a member of a class that situations
+    define. `wishes` are further goals, which only the task with soft goals has.
     """
 
     seed: int
@@ -92,6 +92,7 @@ class RandomWorld:
     updates: frozenset[str] = frozenset()
     wishes: tuple[Wish, ...] = ()
     extending: bool = False
+    queries: bool = False
     definitions: Mapping[str, str] = field(default_factory=dict)
     described: Mapping[str, tuple[Condition, ...]] = field(default_factory=dict)
 
@@ -118,6 +119,7 @@ def drawn(
     ternary: float = 0.0,
     overlapping: float = 0.0,
     extended: float = 0.0,
+    local: float = 0.0,
 ) -> tuple[RandomWorld, Interpreter]:
     """Return the random world of a seed, and an interpreter of the world.
 
@@ -125,21 +127,23 @@ def drawn(
     ----------
     seed : int
     aggregated, constrained, remembered, mutual, priced, everyone, repeated, nested, negated, wished, several, partial, ternary, \
-    overlapping, extended : float
+    overlapping, extended, local : float
         The shares of worlds with derived amounts, with constraints on every state, with remembered situation types, with two
         situation types that define each other, with behaviours whose costs depend on amounts, with a goal about all individuals
         of a class, with behaviours that change a situation type by several effects, with bounds or constraints on totals of
         totals, with goals that exclude a value or an amount, with soft goals that aren't among the goals, with several
         constraints on every state or on the order of states, with numbers that only some pairs have, with situation types of
-        three arguments, with classes that share individuals or are defined, and with behaviours that extend others.
+        three arguments, with classes that share individuals or are defined, with behaviours that extend others, and with variables
+        that are local to groups of conditions or to effects.
     """
     rng = Random(f"mixed {seed}")
     most, least = (MOST, FEW if rng.random() < 0.5 else 2) if rng.random() > UNBOUNDED else (MOST // 10, 0)
     while True:
-        world = _Draft(
+        draft = _Draft(
             rng, seed, aggregated, constrained, remembered, mutual, priced, repeated=repeated, nested=nested,
-            partial=partial, ternary=ternary, overlapping=overlapping, extended=extended,
-        ).world()  # fmt: skip
+            partial=partial, ternary=ternary, overlapping=overlapping, extended=extended, local=local,
+        )  # fmt: skip
+        world = draft.world()
         world = replace(world, problem=with_constraints(seed, world.problem, several))
         interpreter = Interpreter(world.problem)
         try:
@@ -155,7 +159,8 @@ def drawn(
             meant = _of_everyone(seed, interpreter.wanting(goal), everyone)
             wanted = wishes(seed, meant, [state for state, _ in costs], wished)
             world = replace(world, problem=meant.problem, wishes=wanted)
-            return _with_excluded(*_with_derived_goal(world, meant), negated)
+            world, meant = _with_excluded(*_with_derived_goal(world, meant), negated)
+            return _with_local(world, meant, _local_goals(draft, interpreter, [state for state, _ in costs]))
 
 
 def crowded(seed: int, constrained: float = 0.0, **shares: float) -> tuple[RandomWorld, Interpreter, list[State]]:
@@ -244,6 +249,30 @@ def _with_excluded(world: RandomWorld, meant: Interpreter, share: float) -> tupl
         }
         found, wanting = _wanting(found, wanted, left) or (found, wanting)
     return found, wanting
+
+
+def _local_goals(draft: _Draft, meant: Interpreter, states: Sequence[State]) -> Iterator[Condition]:
+    """Yield conditions with local variables that hold in some of the states, if the world has such variables."""
+    draft.rng = own = Random(f"local goals {draft.seed}")
+    some = own.sample(states, min(len(states), WALK))
+    for _ in range(TRIES if draft.local else 0):
+        wanted = Phrases(draft, HIGHEST).local([], 1)
+        if wanted is not None and any(meant.holds([wanted], state) for state in some):
+            yield wanted
+
+
+def _with_local(
+    world: RandomWorld, meant: Interpreter, conditions: Iterable[Condition]
+) -> tuple[RandomWorld, Interpreter]:
+    """Return a world; in a share of the worlds, one of the conditions is a goal, and one is a wish."""
+    own, goal = Random(f"local goal {world.seed}"), world.problem.goal
+    changed = own.random() < 0.3
+    for wanted in conditions:
+        if world.wishes and own.random() < 0.5:
+            world = replace(world, wishes=(*world.wishes[:-1], replace(world.wishes[-1], condition=wanted)))
+        elif changed and (found := _wanting(world, wanted, {s: v for s, v in goal.items() if own.random() < 0.5})):
+            return found
+    return world, meant
 
 
 def _wanting(
@@ -354,6 +383,11 @@ def _sayable(value: Any) -> bool:
     return isinstance(value, str) or (abs(value) < 100 and Fraction(value).denominator in (1, 2, 4))
 
 
+def _shared(terms: Iterable[str]) -> list[str]:
+    """Return the terms that aren't local to an effect."""
+    return [term for term in terms if not term.startswith(LOCAL)]
+
+
 def _recursive(aggregate: Aggregate, rules: Mapping[str, Sequence[Rule]]) -> bool:
     """Return whether an aggregate depends on a recursively defined situation type."""
     needs = closure(
@@ -381,8 +415,10 @@ class _Draft(Vocabulary):
         ternary: float = 0.0,
         overlapping: float = 0.0,
         extended: float = 0.0,
+        local: float = 0.0,
     ) -> None:
         super().__init__(rng)
+        self.local = Random(f"local {seed}").random() < local
         self.repeated = Random(f"repeated {seed}").random() < repeated
         self.crowd, self.valued, self.nested = crowd, priced, nested
         self.seed, self.share, self.prevented = seed, aggregated, constrained
@@ -437,9 +473,11 @@ class _Draft(Vocabulary):
         problem = self.totalled(self.constrained(problem))
         updates = frozenset(b.name for b in behaviors if self.chance(0.5)) if self.chance(UPDATES) else frozenset()
         updates = frozenset(b.name for b in behaviors) if extending else updates
+        if self.local and (own := Random(f"queries {self.seed}")).random() < 0.3:
+            updates = frozenset(b.name for b in behaviors if own.random() < 0.7)
         return RandomWorld(
             self.seed, problem, self.parents, self.owners, frozenset(self.pairs), self.axioms, updates,
-            extending=extending, definitions=self.definitions, described=self.described,
+            extending=extending, queries=self.local, definitions=self.definitions, described=self.described,
         )  # fmt: skip
 
     def individuals(self) -> None:
@@ -932,7 +970,7 @@ class _Draft(Vocabulary):
         for one in behaviors:
             writer = Phrases(self, one.level)
             writer.kinds = {**one.kinds}
-            price = writer.number(list(writer.kinds), 1, extrema=False) if self.chance(0.6) else None
+            price = writer.number(_shared(writer.kinds), 1, extrema=False) if self.chance(0.6) else None
             if price is not None:
                 one = replace(one, cost=1.0, price=price)
                 one = replace(one, preconditions=(*one.preconditions, *([one.priced] if one.priced else [])))
@@ -970,7 +1008,7 @@ class _Draft(Vocabulary):
         writer = Phrases(self, level)
         writer.kinds = {**upper.kinds}
         parameters = [p.name for p in upper.parameters]
-        bound = list(writer.kinds)
+        bound = _shared(writer.kinds)
         more = writer.conditions(bound, self.rng.choice((0, 0, 1)), 1)
         derived = {*self.rules, *self.remembers}
         lower = [s for s in self.situations.values() if s.level == level and s.name not in derived]

@@ -32,6 +32,9 @@ from confab.reasoner.symbols import (
 EACH, ANYONE, SELF = "?each", "?anyone", "?self"
 """Variables of conditions that a scene writes as a class in place of an individual (`EACH`), or as an absence (`ANYONE`), and of
 the conditions of a described class (`SELF`)."""
+LOCAL = "?v"
+"""The first letters of variables that a value determines, and that only one group of conditions or one effect mentions. In a
+problem, the group is a witness of the variable. A scene writes the conditions of the witness as the group."""
 
 
 STANDARD = ("A", "B", "A1")
@@ -71,6 +74,8 @@ class Vocabulary:
         """The OWL expressions of defined classes, and the conditions on a member of a class that situations define."""
         self.repeated = False
         """Whether several effects of a behaviour may change one situation type."""
+        self.local = False
+        """Whether variables are drawn that are local to a group of conditions or to an effect."""
         self.crowd = 0
         """Number of additional individuals of each class; with such individuals, few effects concern a whole class."""
 
@@ -182,6 +187,8 @@ class Phrases:
         """Return a random condition; a variable that the condition determines is added to `bound`."""
         rng, draft = self.rng, self.draft
         negated = rng.random() < 0.35
+        if draft.local and rng.random() < 0.35 and (grouped := self.local(bound, depth)) is not None:
+            return grouped
         kind = rng.choice(CONDITIONS)
         if draft.partial and rng.random() < 0.3:
             kind = "amount"
@@ -249,6 +256,87 @@ class Phrases:
             )
             return AnyOf(groups, rng.random() < 0.2)
         return self.value(bound)
+
+    def local(self, bound: Sequence[str], depth: int) -> Condition | None:
+        """Return a condition with groups of conditions that have local variables, or None if no value determines a variable.
+
+        Different groups may use the same names of variables.
+        """
+        rng = self.rng
+        shape = rng.choice(("some", "none", "neither", "neither", "either"))
+        if shape in ("some", "none"):
+            variable = rng.choice([name for name in ("?u0", "?u1", "?u2", "?u3") if name not in bound])
+            of = self.draft.kind(rng.choice(("A", "B", "A1")))
+            self.inner[variable] = of
+            inner = self.determining([*bound, variable], variable, depth)
+            if inner and rng.random() < 0.4:
+                inner.append(self.value([*bound, variable], variable))
+            return Witness(variable, of, tuple(inner), shape == "none") if inner else None
+        found = [
+            self.determining(bound, None, depth) for _ in range(1 if shape == "neither" else rng.choice((2, 2, 3)))
+        ]
+        groups = [group or [self.value(bound)] for group in found]
+        return AnyOf(tuple(map(tuple, groups)), shape == "neither" or rng.random() < 0.2) if any(found) else None
+
+    def determining(self, bound: Sequence[str], about: str | None, depth: int) -> list[Condition]:
+        """Return the witness of a local variable with the value of a situation, `about` among its arguments if possible."""
+        rng, draft = self.rng, self.draft
+        if (drawn := self.determined(bound, about)) is None:
+            return []
+        variable, kind, first = drawn
+        inner, within = [*first], [*bound, variable]
+        for _ in range(rng.choice((1, 1, 2)) - (len(first) > 1)):
+            draw = rng.random()
+            nested = self.local(within, depth - 1) if draw < 0.2 and depth > 0 else None
+            if nested is not None:
+                inner.append(nested)
+            elif draw < 0.4:
+                inner.append(
+                    EqualityCondition(
+                        variable, rng.choice([*bound, *draft.classes[kind]] or [variable]), rng.random() < 0.6
+                    )
+                )
+            elif draw < 0.5:
+                inner.append(ClassCondition(variable, draft.kind(rng.choice(("A1", "B"))), rng.random() < 0.4))
+            elif draw < 0.6 and (compared := self.comparison(within, False)) is not None:
+                inner.append(compared)
+            else:
+                inner.append(self.value(within, variable))
+        return [Witness(variable, kind, tuple(inner))]
+
+    def determined(self, bound: Sequence[str], about: str | None) -> tuple[str, str, tuple[Condition, ...]] | None:
+        """Return a local variable, its class and the conditions that determine the variable, or None if no value does."""
+        rng, draft = self.rng, self.draft
+        functional = [s for s in self.seen() if not s.boolean]
+        if about is not None:
+            mine = set(self.kinds_of(about))
+            functional = [s for s in functional if mine & set(draft.classes[s.arguments[0]])] or functional
+        if not functional:
+            return None
+        one = rng.choice(functional)
+        arguments = [self.term(bound, of) for of in one.arguments]
+        if about is not None and set(self.kinds_of(about)) & set(draft.classes[one.arguments[0]]):
+            arguments[0] = about
+        if None in arguments:
+            return None
+        values = set(draft.classes[one.range])
+        kinds = [of for of in ("A", "B", "A1", *draft.overlaps) if values & set(draft.classes[of])]
+        kind = rng.choice(kinds) if kinds and rng.random() < 0.5 else one.range
+        bases = {
+            name: conditions
+            for name, conditions in draft.described.items()
+            if isinstance(conditions[0], ClassCondition)
+            and values & set(draft.classes[conditions[0].kind])
+            and all(draft.situations[each].level <= self.level for each in named(conditions))
+        }
+        name = rng.choice(sorted(bases)) if bases and rng.random() < 0.5 else ""
+        variable = rng.choice([one for one in (f"{LOCAL}{n}_{name or kind}" for n in range(4)) if one not in bound])
+        of_class: list[Condition] = []
+        if name and isinstance(first := bases[name][0], ClassCondition):
+            kind = first.kind
+            of_class = [AnyOf((tuple(substituted(each, {SELF: variable}) for each in bases[name]),))]
+        self.inner[variable] = kind
+        return variable, kind, (ValueCondition(one.name, tuple(map(str, arguments)), variable), *of_class)
 
     def comparison(self, bound: Sequence[str], negated: bool) -> Condition | None:
         """Return a random comparison of numbers, or None if the level has no numbers."""
@@ -340,6 +428,19 @@ class Phrases:
                 and (of_class := self.described(EACH, False)) is not None
             ):
                 when = (of_class,)
+        own: str | None = None
+        if draft.local and rng.random() < 0.4:
+            drawn = self.determined([EACH] if each else bound, EACH if each else None)
+            if drawn is not None and not (each and _mentions_twice(drawn[2][0])):
+                own, self.kinds[own] = drawn[0], drawn[1]
+                when = drawn[2]
+                if rng.random() < 0.5:
+                    more = self.value([own], own)
+                    when = (*when, more if not isinstance(more, EqualityCondition) else EqualityCondition(own, own))
+                places = [i for i, of in enumerate(one.arguments) if set(self.kinds_of(own)) & set(draft.classes[of])]
+                if (places := [i for i in places if arguments[i] != EACH]) and rng.random() < 0.5:
+                    at = rng.choice(places)
+                    arguments = (*arguments[:at], own, *arguments[at + 1 :])
         if one.quantity is not None:
             if not draft.repeated and any(change.situation == one.name for change in numbers):
                 return
@@ -357,7 +458,8 @@ class Phrases:
             if not draft.repeated and any(effect.situation == one.name for effect in values):
                 return
             visible = self.visible(draft.classes[one.range])
-            fitting = [t for t in bound if set(self.kinds_of(t)) and set(self.kinds_of(t)) <= set(visible)]
+            mine = bound if own is None else [*bound, own]
+            fitting = [t for t in mine if set(self.kinds_of(t)) and set(self.kinds_of(t)) <= set(visible)]
             if not visible and not fitting:
                 return
             among = fitting if fitting and rng.random() < (0.8 if draft.crowd else 0.5) else visible or fitting

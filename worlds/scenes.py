@@ -9,7 +9,7 @@ from random import Random
 
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, bounds, written
 from confab.reasoner.derivation import TASK
-from confab.reasoner.language import substituted
+from confab.reasoner.language import groups, is_variable, plain_variables, substituted, terms, walk
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -34,7 +34,7 @@ from confab.reasoner.updates.writing import Situations, update
 from confab.reasoner.vocabulary import ARGUMENTS
 from worlds.constraining import stated
 from worlds.mixed import RandomWorld
-from worlds.phrases import ANYONE, EACH, SELF
+from worlds.phrases import ANYONE, EACH, LOCAL, SELF
 
 HEADER = """\
 @prefix :        <https://example.org/w#> .
@@ -71,9 +71,27 @@ def without(one: Behavior, other: Behavior) -> Behavior | None:
     """Return what a behaviour adds to another behaviour that it extends, or None if it lacks a part of the other one."""
     parts = ("parameters", "variables", "preconditions", "effects", "amounts")
     mine, its = ([getattr(each, part) for part in parts] for each in (one, other))
+    mine[1] = (*its[1], *(variable for variable in mine[1] if variable not in its[1]))
     if any(part[: len(less)] != less for part, less in zip(mine, its, strict=True)):
         return None
     return replace(one, **{name: part[len(less) :] for name, part, less in zip(parts, mine, its, strict=True)})
+
+
+def _names(condition: Condition) -> set[str]:
+    """Return the variables of a condition, with the variables of witnesses."""
+    witnesses = {inner.variable for inner in walk(condition) if isinstance(inner, Witness)}
+    return witnesses.union(*(filter(is_variable, terms(inner)) for inner in walk(condition)))
+
+
+def _joined(conditions: Sequence[Condition], outside: frozenset[str] = frozenset()) -> bool:
+    """Return whether a name is local to a side of UNION, and occurs outside of the UNION; an update may not contain such names."""
+    shared = plain_variables(conditions)
+    for i, one in enumerate(conditions):
+        if isinstance(one, AnyOf) and len(one.alternatives) > 1 and not one.negated:
+            others = outside.union(*map(_names, (*conditions[:i], *conditions[i + 1 :])))
+            if not (_names(one) - shared).isdisjoint(name for name in others if name.startswith((LOCAL, "?u"))):
+                return True
+    return any(_joined(group) for one in conditions for group in groups(one))
 
 
 class _Scene:
@@ -86,7 +104,7 @@ class _Scene:
         self.written: list[Behavior] = []  # behaviours written as updates
         self.terms: dict[str, str] = {}
         self.where, self.count = "", 0
-        self.rng = Random(f"goals {world.seed}")
+        self.rng, self.queries = Random(f"goals {world.seed}"), Random(f"queries {world.seed}")
 
     def lines(self) -> Iterator[str]:
         yield from self.classes()
@@ -187,6 +205,12 @@ class _Scene:
     def rule(self, name: str, rule: Rule) -> Iterator[str]:
         parameters, conditions = self.by_class(rule.parameters, rule.conditions)
         rule = replace(rule, parameters=parameters, conditions=conditions)
+        opened = self.with_own(rule.behavior)
+        rule = replace(rule, variables=opened.variables, conditions=opened.preconditions)
+        if self.world.queries and self.queries.random() < 0.5 and (text := self.as_update(rule.behavior)) is not None:
+            query = text.replace("INSERT", "CONSTRUCT", 1)
+            yield self.node(name, "owl:NamedIndividual, c:Rule", f'c:construct """{query}"""')
+            return
         self.begin(name, [p.name for p in (*rule.parameters, *rule.variables)])
         asked = [self.condition(one) for one in rule.conditions]
         head = self.said(rule.situation, [p.name for p in rule.parameters], TRUE)
@@ -200,7 +224,9 @@ class _Scene:
         terms, conditions = self.by_class((*one.parameters, *one.variables), one.conditions)
         many = len(one.parameters)
         one = replace(one, parameters=terms[:many], variables=terms[many:], conditions=conditions)
-        self.begin(name, [p.name for p in (*one.parameters, *one.variables)])
+        opened = self.with_own(one.behavior)
+        one = replace(one, conditions=opened.preconditions)
+        self.begin(name, [p.name for p in (*opened.parameters, *opened.variables)])
         owners = [p.name for p in one.parameters]
         if "|" in one.parameters[0].kind and isinstance(one.conditions[0], EqualityCondition):
             owners = [one.conditions[0].right]  # the rule of a total of several classes names one individual
@@ -211,7 +237,7 @@ class _Scene:
         said += [self.side("right", one.amount)] if one.function != "count" else []
         said += [f"c:condition {', '.join(asked)}"] if asked else []
         yield self.node(name, "owl:NamedIndividual, c:Rule", *said)
-        yield from self.declared(one.behavior)
+        yield from self.declared(replace(opened, parameters=one.parameters))
         yield from self.nodes
 
     def begin(self, name: str, terms: Sequence[str]) -> None:
@@ -230,7 +256,7 @@ class _Scene:
         head = [f"c:level {one.level}", f"c:index {index}"]
         head += [f"c:cost {one.cost}"] if one.cost != 1 else []
         parameters, conditions = self.by_class(one.parameters, one.preconditions)
-        one = replace(one, parameters=parameters, preconditions=conditions)
+        one = self.with_own(replace(one, parameters=parameters, preconditions=conditions))
         if one.name in self.world.updates and one.price is None and (text := self.as_update(one)) is not None:
             said = [f'c:update """{text}"""']
             for other in self.written if self.world.extending else ():
@@ -277,6 +303,8 @@ class _Scene:
             for name, its in self.situations.items()
             if self.world.owners.get(name) and (name in self.world.pairs or not its.boolean)
         }
+        if _joined(one.asked, frozenset(name for effect in every for c in effect.when for name in _names(c))):
+            return None
         try:
             return update(one, Situations(properties, self.world.pairs), _iri)
         except ValueError:
@@ -292,6 +320,39 @@ class _Scene:
                 if one.alternatives[0] == tuple(substituted(each, {SELF: of.term}) for each in conditions):
                     return of.term, name, of.kind
         return None
+
+    def with_own(self, one: Behavior) -> Behavior:
+        """Return a behaviour with the conditions of local variables in place of the variables' witnesses."""
+        kinds = dict(one.kinds)
+        conditions = tuple(self.opened(condition, kinds) for condition in one.preconditions)
+        effects = tuple(replace(e, when=tuple(self.opened(c, kinds) for c in e.when)) for e in one.effects)
+        amounts = tuple(replace(e, when=tuple(self.opened(c, kinds) for c in e.when)) for e in one.amounts)
+        variables = (Parameter(name, kind) for name, kind in kinds.items() if name not in one.kinds)
+        return replace(
+            one, variables=(*one.variables, *variables), preconditions=conditions, effects=effects, amounts=amounts
+        )
+
+    def opened(self, one: Condition, kinds: dict[str, str]) -> Condition:
+        """Return a condition whose groups have local variables in place of witnesses; add the variables' classes to `kinds`."""
+
+        def group(conditions: Sequence[Condition]) -> tuple[Condition, ...]:
+            found = list[Condition]()
+            for each in conditions:
+                if isinstance(each, Witness) and not each.negated and each.variable.startswith(LOCAL):
+                    (own,), inner = self.by_class((Parameter(each.variable, each.kind),), each.conditions)
+                    if kinds.setdefault(own.name, own.kind) == own.kind:
+                        found += group(inner)
+                        continue
+                found.append(self.opened(each, kinds))
+            return tuple(found)
+
+        match one:
+            case Witness():
+                return replace(one, conditions=group(one.conditions))
+            case AnyOf(alternatives) if self.class_of(one) is None:
+                return replace(one, alternatives=tuple(map(group, alternatives)))
+            case _:
+                return one
 
     def with_classes(self, one: Condition) -> Condition:
         """Return a condition with described classes in place of their conditions."""
@@ -486,7 +547,7 @@ class _Scene:
 
     def task(self) -> Iterator[str]:
         self.begin("task", ())
-        goals, hard = list[str](), list[str]()
+        goals, hard, variables = list[str](), list[str](), dict[Parameter, None]()
         for symbol, value in self.goals():
             weight = self.problem.weights.get(symbol)
             soft = [] if weight is None else [f"c:weight {_decimal(weight)}"]
@@ -496,9 +557,12 @@ class _Scene:
                     continue  # one node states a wish about all individuals of a class
                 (rule,) = self.problem.domain.rules[symbol.situation]
                 goals.append(f":{name}")
-                node = self.wish(
-                    self.world.wishes[int(name.removeprefix("wish"))].condition if member else rule.conditions[0]
-                )
+                wanted = self.world.wishes[int(name.removeprefix("wish"))].condition if member else rule.conditions[0]
+                kinds = dict[str, str]()
+                wanted = self.opened(wanted, kinds)
+                self.terms |= {variable: f":task.{variable[1:]}" for variable in kinds}
+                variables |= {Parameter(variable, kind): None for variable, kind in kinds.items()}
+                node = self.wish(wanted)
                 self.nodes[-1] = (
                     " ; ".join([self.nodes[-1].replace(node, goals[-1], 1).removesuffix(" ."), *soft]) + " ."
                 )
@@ -515,6 +579,8 @@ class _Scene:
         if len(hard) > 1 and self.rng.random() < 0.1:
             hard = [self.part("AllOf", f"c:condition {', '.join(hard)}")]
         yield self.node("task", "owl:NamedIndividual, c:Task", f"c:goal {', '.join([*goals, *hard])}")
+        for one in variables:
+            yield f"{self.terms[one.name]} a owl:NamedIndividual, c:Variable ; c:termType {_iri(one.kind)} ."
         yield from self.nodes
 
     def goals(self) -> Iterator[tuple[Symbol, str]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from time import process_time
@@ -354,3 +355,20 @@ def test_the_wider_worlds_have_all_their_constructs() -> None:
         "c:argument3",
     ):
         assert any(said in text for text in texts), said
+
+
+@pytest.mark.parametrize("seed", [1_600_000_002, 1_600_000_016])
+def test_worlds_with_local_variables_have_no_faults(seed: int, tmp_path: Path) -> None:
+    assert not Judge(mixed(seed, local=1.0), tmp_path).judged().complaints
+
+
+def test_local_variables_occur_in_all_parts_of_a_world() -> None:
+    found = set[str]()
+    for seed in (1_600_000_002, 1_600_000_004, 1_600_000_017):
+        text = scene(mixed(seed, local=1.0, overlapping=1.0))
+        own = re.findall(r"^:([A-Za-z])\S*\.v\d_\S* a owl:NamedIndividual, c:Variable ; c:termType :(\w+)", text, re.M)
+        found |= {part for part, _ in own} | ({"query"} if "c:construct" in text else set())
+        found |= {"defined" for _, kind in own if f":{kind} a owl:Class" in text and kind.startswith("K")}
+    assert found >= {"L", "D", "S", "t", "query", "defined"}, (
+        "behaviours, rules, totals, goals, queries, defined classes"
+    )
