@@ -128,7 +128,10 @@ class Lowering:
         self.recursive = circular(self.rules)
         self.kept = NegationPredicates(problem, behaviors, words)
         changed = {effect.situation for behavior in behaviors for effect in behavior.amounts}
-        self.totals = sorted(changed & problem.domain.aggregates.keys())
+        scaled = {
+            e.situation for one in behaviors for e in one.amounts if e.operation == "scale" and situations_in(e.amount)
+        }
+        self.judged_later = sorted((changed & problem.domain.aggregates.keys()) | scaled)
 
     # ------------------------------------------------------------------------------------------------- conditions
 
@@ -248,7 +251,7 @@ class Lowering:
         for one, other in combinations(behavior.amounts, 2):
             quantity = self.words.situations[one.situation].quantity
             added = {one.operation, other.operation} <= {"increase", "decrease"}
-            summed = one.situation in self.totals or not (quantity and quantity.bounded)
+            summed = one.situation in self.judged_later or not (quantity and quantity.bounded)
             if one.situation != other.situation or (added and summed):
                 continue
             differ = [pair for pair in zip(one.arguments, other.arguments, strict=True) if pair[0] != pair[1]]
@@ -481,7 +484,7 @@ class Lowering:
         If an amount is multiplied or assigned and then increased, both effects become one assignment, because planners don't
         apply several such effects in sequence.
         """
-        groups: dict[tuple[str, FunctionTerm, Formula, tuple[PddlTerm, ...]], list[tuple[str, NumericTerm, bool]]] = {}
+        groups: dict[tuple[str, FunctionTerm, Formula, tuple[PddlTerm, ...]], list[tuple[str, NumericTerm]]] = {}
         for effect in behavior.amounts:
             cell, inside = self.cell(effect, terms, scope)
             if cell.when != NEVER:
@@ -490,20 +493,19 @@ class Lowering:
                 scope.needs.append(no(some(cell.own, both([cell.when, no(there)]))))
                 at = self.words.amount(effect.situation, cell.terms)
                 group = groups.setdefault((effect.situation, at, cell.when, cell.own), [])
-                by = self.words.number(effect.amount, inside)
-                group.append((effect.operation, by, effect.operation != "scale" or not situations_in(effect.amount)))
+                group.append((effect.operation, self.words.number(effect.amount, inside)))
         for (situation, at, when, own), changes in groups.items():
             result: NumericTerm = at
-            for operation, by, _ in changes:
+            for operation, by in changes:
                 sign = {"scale": "*", "increase": "+", "decrease": "-"}.get(operation)
                 result = by if sign is None else Arithmetic(sign, result, by)
-            # Several effects change a total at once: `within_bounds` states its bounds.
-            quantity = None if situation in self.totals else self.words.situations[situation].quantity
+            # Several effects change a total at once, and a product of amounts isn't linear: `within_bounds` states their bounds.
+            quantity = None if situation in self.judged_later else self.words.situations[situation].quantity
             for sign, limit in (("<", quantity.least), (">", quantity.most)) if quantity else ():
-                if limit is not None and all(linear for _, _, linear in changes):
+                if limit is not None:
                     scope.needs.append(no(some(own, both([when, Compare(sign, result, limit)]))))
-            if all(operation in ("increase", "decrease") for operation, _, _ in changes):
-                for (operation, by), times in Counter((operation, by) for operation, by, _ in changes).items():
+            if all(operation in ("increase", "decrease") for operation, _ in changes):
+                for (operation, by), times in Counter((operation, by) for operation, by in changes).items():
                     # PDDL planners treat equal effects of one action as one effect.
                     total = _times(by, times)
                     yield ConditionalEffect(Assignment(operation, at, total), when, own)
@@ -511,12 +513,12 @@ class Lowering:
                 yield ConditionalEffect(Assignment("assign", at, result), when, own)
 
     def within_bounds(self, scope: ActionScope) -> Iterator[Formula]:
-        """Yield the formulas which state that all totals are within their bounds.
+        """Yield the formulas which state that totals, and amounts that effects scale by an amount, are within their bounds.
 
-        The bounds of totals are preconditions of every action, and a part of the goal. A state in which a total is out of its
-        bounds is therefore a dead end.
+        These bounds are preconditions of every action, and a part of the goal. A state in which such an amount is out of its bounds
+        is therefore a dead end.
         """
-        for situation in self.totals:
+        for situation in self.judged_later:
             kind = self.words.situations[situation]
             own = tuple(self.words.variable(scope.fresh(one), one) for one in kind.arguments)
             its = [*map(self.words.guard, own, kind.arguments), self.words.exists(situation, own)]

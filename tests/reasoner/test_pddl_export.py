@@ -38,6 +38,7 @@ from confab.reasoner.symbols import (
 from confab.reasoner.validation.validate import validate
 from worlds.interpreter import Interpreter, TooManyStatesError
 from worlds.mixed import mixed
+from worlds.writing import behavior, world
 
 CASES = Path(__file__).with_name("cases")
 MOST = 2_000
@@ -257,6 +258,15 @@ def test_an_exported_amount_has_a_value_for_each_object_that_its_function_accept
     assert "(= (load b) 0)" in exported.problem
     assert "(has_load b)" not in exported.problem
     assert least(problem) == least(round_trip(problem)) == 2.0
+
+
+@pytest.mark.parametrize(("most", "cost"), [(5, None), (6, 3.0)])
+def test_an_amount_that_an_amount_scales_keeps_its_bounds_in_an_export(most: int, cost: float | None) -> None:
+    grow = replace(behavior("GROW", 1, "", [], []), amounts=(AmountEffect("RATE", (), "increase", Fraction(1)),))
+    scale = replace(behavior("SCALE", 1, "", [], []), amounts=(AmountEffect("N", (), "scale", Amount("RATE", ())),))
+    kinds = [SituationType(name, (), name, quantity=Quantity(most=Fraction(most))) for name in ("N", "RATE")]
+    problem = world(kinds, [grow, scale], {}, {"N": "2", "RATE": "1"}, {"N": ">=6"})
+    assert least(problem) == least(round_trip(problem)) == cost
 
 
 def test_rules_are_written_in_place_of_their_facts_unless_they_are_recursive() -> None:
