@@ -297,6 +297,20 @@ class Timing:
         """Return the effects that have the given span."""
         return tuple(effect for at, effect in self.effects if at is span)
 
+    def before(self, span: Span) -> tuple[Condition, ...]:
+        """Return the conditions that hold immediately before the effects in a span take place.
+
+        A condition throughout the behaviour holds after the effects at the start, and before the pending effects take place.
+        """
+        apart = {Span.START: Span.START, Span.END: Span.THROUGHOUT}
+        changed = {effect.situation for effect in self.made(apart[span])} if span in apart else set[str]()
+        held = (
+            one
+            for one in self.asked(Span.THROUGHOUT)
+            if not (isinstance(one, ValueCondition) and one.situation in changed)
+        )
+        return (*(() if span is Span.THROUGHOUT else self.asked(span)), *held)
+
 
 @dataclass(frozen=True)
 class Times:

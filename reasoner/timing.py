@@ -13,6 +13,7 @@ from dataclasses import replace
 from fractions import Fraction
 from itertools import product
 
+from confab.reasoner.afterwards import Afterwards, Simplified, TooManyCasesError, closed
 from confab.reasoner.amounts import (
     COMPARING,
     OPERATIONS,
@@ -24,13 +25,14 @@ from confab.reasoner.amounts import (
     with_amounts,
 )
 from confab.reasoner.effects import made_of
-from confab.reasoner.language import terms, walk
+from confab.reasoner.language import DomainError, plain_variables, terms, walk
 from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     FALSE,
     NEVER,
     TRUE,
     AmountEffect,
+    AnyOf,
     Behavior,
     Comparison,
     Condition,
@@ -158,6 +160,71 @@ def _compared_before(condition: Comparison, amounts: Mapping[Amount, Expression]
     if not (isinstance(left, Fraction) and isinstance(right, Fraction) and holds(left, right) is not condition.negated):
         found.append(replace(condition, left=left, right=right))
     return tuple(found)
+
+
+def given_itself(
+    behavior: Behavior,
+    conditions: Iterable[Condition],
+    spans: Collection[Span],
+    situations: Mapping[str, SituationType],
+    classes: Mapping[str, Sequence[str]],
+    since: Span = Span.START,
+) -> tuple[Condition, ...]:
+    """Return conditions of a durative behaviour before its own effects in earlier spans, beginning with the span `since`.
+
+    In contrast to `projected`, the conditions may have alternatives, witnesses or totals. Only conditions of this kind with one
+    of the spans are changed.
+    """
+    found = list[Condition]()
+    for condition in conditions:
+        its = [span for span, one in timing_of(behavior).conditions if one == condition and span in spans]
+        priced = condition in (behavior.priced, behavior.lasting)
+        if its and isinstance(condition, AnyOf | Witness | Comparison) and not priced:
+            for span in its:
+                found += _given(
+                    condition,
+                    tuple(Span)[tuple(Span).index(since) : tuple(Span).index(span)],
+                    behavior,
+                    situations,
+                    classes,
+                )
+        else:
+            found.append(condition)
+    return tuple(dict.fromkeys(found))
+
+
+def _given(
+    condition: Condition,
+    earlier: Sequence[Span],
+    behavior: Behavior,
+    situations: Mapping[str, SituationType],
+    classes: Mapping[str, Sequence[str]],
+) -> tuple[Condition, ...]:
+    """Return what a condition requires before the effects of a durative behaviour in earlier spans."""
+    timing, kinds = timing_of(behavior), behavior.kinds
+    bound = frozenset({p.name for p in behavior.parameters} | plain_variables(behavior.preconditions))
+    found: Simplified = condition
+    for span in reversed(earlier):
+        made = timing.made(span)
+        part = replace(
+            behavior,
+            effects=tuple(one for one in made if isinstance(one, ValueEffect)),
+            amounts=tuple(one for one in made if isinstance(one, AmountEffect)),
+        )
+        kinds = {**kinds, **{one.each.name: one.each.kind for one in made if one.each is not None}}
+        after = Afterwards(part, situations, classes, kinds, timing.before(span))
+        if not isinstance(found, bool) and after.changed(found):
+            (found,) = closed([found], bound, after.kinds)
+            try:
+                found = after.condition(after.renamed(found))
+            except TooManyCasesError:
+                raise DomainError(
+                    f"{behavior.name}: too many of its effects may decide one of its conditions; use fewer effects"
+                ) from None
+            if not isinstance(found, bool):
+                (found,) = closed([found], bound, after.kinds)
+        kinds = after.kinds
+    return (found,) if not isinstance(found, bool) else () if found else (condition, NEVER)
 
 
 def only_during(problem: Problem) -> frozenset[str]:

@@ -49,7 +49,7 @@ from confab.reasoner.symbols import (
     ValueCondition,
     ValueEffect,
 )
-from confab.reasoner.timing import fixed_at_begin, only_during, projected, timing_of, with_fixed
+from confab.reasoner.timing import fixed_at_begin, given_itself, only_during, projected, timing_of, with_fixed
 
 BEGIN, END, RUNNING, HELD, BUSY = "@begin", "@end", "@running", "@held", "@busy"
 FIRST = 0.5
@@ -212,12 +212,18 @@ class _Cut:
         its = tuple(parameter.name for parameter in own.parameters)
         begun = [(Span.START, e) for e in timing.made(Span.START)]
         asked, _ = projected([one for one in timing.conditions if one[0] is not Span.END], begun)
+        asked = given_itself(
+            behavior, asked, (Span.START, Span.THROUGHOUT), self.whole.domain.situations, self.whole.classes
+        )
         marks = [(running.name, its), *self.busy(behavior)]
         free = [ValueCondition(*cell, FALSE) for cell in marks]
         made = (*timing.made(Span.START), *(ValueEffect(*cell, TRUE) for cell in marks))
         yield _behavior(own, behavior.name + BEGIN, (*asked, *free), made)
         pending = [(Span.THROUGHOUT, e) for e in timing.made(Span.THROUGHOUT)]
         last, _ = projected([(Span.END, c) for c in timing.asked(Span.END)], pending)
+        last = given_itself(
+            behavior, last, (Span.END,), self.whole.domain.situations, self.whole.classes, since=Span.THROUGHOUT
+        )
         held = (*timing.asked(Span.THROUGHOUT), *last)
         made = (*timing.made(Span.THROUGHOUT), *timing.made(Span.END), *(ValueEffect(*cell, FALSE) for cell in marks))
         ended = _behavior(own, behavior.name + END, (*held, replace(free[0], value=TRUE)), made)

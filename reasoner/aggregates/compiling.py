@@ -15,7 +15,8 @@ from confab.reasoner.folding import Folding
 from confab.reasoner.language import DomainError, mentions, plain_variables, walk
 from confab.reasoner.limits import check
 from confab.reasoner.problem import Domain
-from confab.reasoner.symbols import AnyOf, Behavior, Condition, Effect, Witness
+from confab.reasoner.symbols import AnyOf, Behavior, Condition, Effect, Span, Witness
+from confab.reasoner.timing import given_itself
 
 
 def compiled(domain: Domain, classes: Mapping[str, Sequence[str]]) -> Domain:
@@ -43,6 +44,9 @@ def compiled(domain: Domain, classes: Mapping[str, Sequence[str]]) -> Domain:
                     f"{name} changes the facts that determine {stated(one.situation, domain)} by too many effects at once; "
                     "use fewer effects, or another behaviour for some of them"
                 ) from None
+        if behavior.timing is not None:
+            asked = given_itself(behavior, behavior.preconditions, tuple(Span), domain.situations, classes)
+            behavior = replace(behavior, preconditions=asked)
         behaviors[name] = _folded(spread(_prevented(behavior, domain, classes), classes), domain, classes)
         conditions = chain.from_iterable(map(walk, behaviors[name].conditions))
         many = sum(1 for _ in islice(conditions, MOST_CONDITIONS + 1))

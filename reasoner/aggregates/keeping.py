@@ -49,8 +49,6 @@ from confab.reasoner.symbols import (
     Effect,
     Parameter,
     SituationType,
-    Span,
-    Timing,
     ValueCondition,
     ValueEffect,
 )
@@ -112,22 +110,10 @@ def _timed(
             effects=tuple(effect for effect in made if isinstance(effect, ValueEffect)),
             amounts=tuple(effect for effect in made if isinstance(effect, AmountEffect)),
         )
-        keeping = _Keeping(part, aggregate, situations, classes, _holding(timing, span))
+        keeping = _Keeping(part, aggregate, situations, classes, timing.before(span))
         behavior = replace(behavior, variables=keeping.behavior().variables)
         effects += [(span, effect) for effect in keeping.made]
     return replace(behavior, timing=replace(timing, effects=tuple(effects)))
-
-
-def _holding(timing: Timing, span: Span) -> tuple[Condition, ...]:
-    """Return the conditions that hold immediately before the effects in a span take place.
-
-    A condition throughout the behaviour holds after the effects at the start, and before the pending effects take place.
-    """
-    apart = {Span.START: Span.START, Span.END: Span.THROUGHOUT}
-    changed = {effect.situation for effect in timing.made(apart[span])} if span in apart else set[str]()
-    held = (c for c in timing.asked(Span.THROUGHOUT) if not (isinstance(c, ValueCondition) and c.situation in changed))
-    own = () if span is Span.THROUGHOUT else timing.asked(span)
-    return (*own, *held)
 
 
 @dataclass(frozen=True)

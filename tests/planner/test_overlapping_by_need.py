@@ -15,6 +15,7 @@ from confab.planner.solve import Request, solve
 from confab.planner.timed.call import best_in_time
 from confab.planner.timed.plan import TimedPlan, schedule_of
 from confab.planner.timed.validation import validate_in_sequence, validate_timed
+from confab.planner.validation import validate
 from confab.reasoner.aggregates.compiling import compiled
 from confab.reasoner.aggregates.totals import with_totals
 from confab.reasoner.amounts import Amount, Quantity
@@ -27,6 +28,7 @@ from confab.reasoner.symbols import (
     TRUE,
     Aggregate,
     AmountEffect,
+    AnyOf,
     Behavior,
     Comparison,
     Condition,
@@ -395,6 +397,40 @@ def test_a_count_follows_a_fact_that_a_step_gives_itself_for_its_condition_throu
     timed = schedule_of(solve(Request(problem, limits=Limits(seconds=10.0))))
     assert timed is not None
     assert timed.makespan == len("LIGHT")
+
+
+@pytest.mark.parametrize("level", [1, 2])
+@pytest.mark.parametrize("span", [Span.THROUGHOUT, Span.END])
+@pytest.mark.parametrize(
+    "condition",
+    [
+        AnyOf(((has("G", "?t", TRUE),), (has("P", "?t", TRUE),))),
+        Witness("?u", "T", (has("G", "?u", TRUE),)),
+        Comparison(Amount("MANY", ()), ">=", Fraction(1)),
+    ],
+)
+def test_a_step_may_give_itself_an_alternative_a_witness_or_a_total_that_it_needs(
+    condition: Condition, span: Span, level: int
+) -> None:
+    made = (Span.START, becomes("G", "?t", TRUE)), (Span.END, becomes("P", "?t", TRUE))
+    problem = counting(spanned(level, ((span, condition),), made, "P"), level)
+    outcome = solve(Request(problem, limits=Limits(seconds=10.0)))
+    assert outcome.plan is not None
+    assert [step.behavior for step in outcome.plan.primitives] == ["W"]
+    taking = (Span.START, becomes("G", "?t", FALSE)), (Span.END, becomes("P", "?t", TRUE))
+    taken = counting(spanned(level, ((span, condition),), taking, "P"), level)
+    taken = replace(taken, initial={**taken.initial, Symbol("G", ("t",)): TRUE, Symbol("MANY", ()): "1"})
+    assert validate(taken, outcome.plan)
+    assert solve(Request(taken, limits=Limits(seconds=10.0))).status is Status.UNSOLVABLE
+
+
+def counting(problem: Problem, level: int) -> Problem:
+    """Return a compiled problem with the number MANY of the individuals of which G is true, on a level."""
+    kinds = {**problem.domain.situations, "MANY": SituationType("MANY", (), "MANY", level, quantity=Quantity())}
+    kinds["G"] = replace(kinds["G"], level=level)
+    count = Aggregate("MANY", "count", Fraction(1), (), (Parameter("?x", "T"),), (has("G", "?x", TRUE),))
+    domain = compiled(replace(problem.domain, situations=kinds, aggregates={"MANY": count}), problem.classes)
+    return replace(problem, domain=domain, initial=with_totals(domain, problem.classes, {}, problem.initial))
 
 
 def test_a_task_of_several_levels_whose_steps_have_spans_is_proved_unsolvable() -> None:
