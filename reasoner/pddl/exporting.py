@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from confab.reasoner.amounts import written
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.names import local_name
 from confab.reasoner.pddl.formulas import (
@@ -27,7 +28,6 @@ from confab.reasoner.pddl.formulas import (
     calls,
     change_text,
     conjuncts,
-    decimal,
     either,
     formula_text,
     inside,
@@ -71,6 +71,7 @@ def to_pddl(problem: Problem, level: int | None = None) -> Exported:
     ------
     KnowledgeError
         A behaviour gives a symbol a value only during its execution, and the goal or another behaviour may require this value.
+        Or an amount has an initial value without a finite decimal notation.
     """
     if names := sorted(only_during(problem)):
         raise KnowledgeError(
@@ -232,10 +233,14 @@ class _Export:
         """Return the text of the PDDL problem."""
         facts = ["(= (total-cost) 0)"] * self.costs
         for fact in dict.fromkeys(self.facts):
-            facts.append(
-                formula_text(fact) if isinstance(fact, Atom) else f"(= {number_text(fact[0])} {decimal(fact[1])})"
-            )
-        unmet = "".join(f" (* {decimal(weight)} (is-violated {name}))" for name, weight, _ in self.preferences)
+            if isinstance(fact, Atom):
+                facts.append(formula_text(fact))
+                continue
+            what, number = number_text(fact[0]), written(fact[1])
+            if "/" in number:
+                raise KnowledgeError(f"{what} is {number} initially, which no decimal number of PDDL states exactly")
+            facts.append(f"(= {what} {number})")
+        unmet = "".join(f" (* {number_text(weight)} (is-violated {name}))" for name, weight, _ in self.preferences)
         cost = f"(+ (total-cost){unmet})" if unmet else "(total-cost)"
         metric = f"  (:metric minimize {cost})\n" if self.costs else ""
         name = self.words.name("problem", local_name(self.problem.scene))

@@ -13,9 +13,6 @@ from typing import TypeAlias
 
 from confab.reasoner.amounts import written
 
-DIGITS = 30
-"""Number of decimal places to which `decimal` rounds a number without a finite decimal notation."""
-
 
 @dataclass(frozen=True)
 class PddlTerm:
@@ -280,9 +277,3 @@ def number_text(number: NumericTerm) -> str:
         case Fraction():
             text = written(number)
             return f"(/ {number.numerator} {number.denominator})" if "/" in text else text
-
-
-def decimal(number: Fraction) -> str:
-    """Return a number in decimal notation, rounded to `DIGITS` places if no finite decimal notation exists."""
-    text = written(number)
-    return text if "/" not in text else written(Fraction(round(number * 10**DIGITS), 10**DIGITS))

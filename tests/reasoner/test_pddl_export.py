@@ -269,6 +269,15 @@ def test_an_amount_that_an_amount_scales_keeps_its_bounds_in_an_export(most: int
     assert least(problem) == least(round_trip(problem)) == cost
 
 
+def test_an_export_with_an_initial_amount_that_no_decimal_number_states_is_refused() -> None:
+    kinds = [SituationType("N", (), "N", quantity=Quantity())]
+    more = replace(behavior("MORE", 1, "", [], []), amounts=(AmountEffect("N", (), "increase", Fraction(1, 3)),))
+    problem = world(kinds, [more], {}, {"N": "1/4"}, {"N": ">=1"})
+    assert least(problem) == least(round_trip(problem)) == 3.0
+    with pytest.raises(KnowledgeError, match=r"\(n\) is 1/3 initially"):
+        to_pddl(replace(problem, initial={Symbol("N", ()): "1/3"}))
+
+
 def test_rules_are_written_in_place_of_their_facts_unless_they_are_recursive() -> None:
     rule = Rule(
         "NEAR",
