@@ -13,6 +13,7 @@ from confab.planner.plan import Plan, Step
 from confab.planner.validation import BehaviorReader, LoggedState
 from confab.reasoner.limits import checked
 from confab.reasoner.problem import Problem
+from confab.reasoner.symbols import Times
 
 TRIFLE = 2.0**-20
 """Cost added to each primitive when plans are compared; of two plans with equal costs, the shorter plan is then cheaper."""
@@ -63,9 +64,14 @@ def costs(problem: Problem, primitives: Sequence[Primitive]) -> list[float]:
 def in_circles(problem: Problem, plan: Plan) -> int:
     """Return the number of superfluous primitives: primitives on a circle that leads from a state back to the same state.
 
-    Only the outermost of nested circles counts. A sequence of primitives that leaves any symbol changed is no circle.
+    Only the outermost of nested circles counts. A sequence of primitives that leaves any symbol changed is no circle. External
+    events aren't superfluous.
     """
-    rules, facts = BehaviorReader(problem), LoggedState(problem, problem.initial)
+    rules, facts, events = (
+        BehaviorReader(problem),
+        LoggedState(problem, problem.initial),
+        (problem.times or Times()).events,
+    )
     values: dict[tuple[str, tuple[str, ...]], str | None] = {}
     now, states = 0, [0]  # a state is represented by the exclusive or of the hashes of its facts
     for step in checked(plan.primitives, "looking for superfluous steps"):
@@ -76,7 +82,8 @@ def in_circles(problem: Problem, plan: Plan) -> int:
             now ^= hash((cell, values[cell] if cell in values else facts.value(situation, key))) ^ hash((cell, value))
             values[cell] = value
             facts.put(situation, key, value)
-        states.append(now)
+        if step.behavior not in events:
+            states.append(now)
     last = {state: number for number, state in enumerate(states)}
     circles, at = 0, 0
     while at < len(states) - 1:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -27,7 +27,7 @@ from confab.planner.timed.schedules import (
     shortest,
     turn_edges,
 )
-from confab.planner.timed.validation import validate_timed
+from confab.planner.timed.validation import omitted, validate_timed
 from confab.planner.validation import validate
 from confab.reasoner.derivation import said_by
 from confab.reasoner.limits import LimitError, check, overtime, within
@@ -171,6 +171,10 @@ def in_time(
         The order of the begins and ends of the primitives; by default the primitives are executed one after another.
     """
     until = inf if seconds is None else perf_counter() + seconds
+
+    def left() -> float | None:
+        return None if until == inf else max(until - perf_counter(), 0.0)
+
     steps = plan.primitives
     its_events = list(in_sequence(steps)) if events is None else list(events)
     try:
@@ -206,6 +210,10 @@ def in_time(
                     faults = validate_timed(problem, timed, separation)
                 if not faults:
                     return Timed(timed)
+                if events is None and (missing := omitted(problem, timed)):
+                    complete = in_time(problem, _with_events(problem, timed, missing), left(), separation)
+                    if complete.plan is not None:
+                        return complete
         if not choices.of and until:
             until = 0.0  # no search: the turns keep the plan's order
             continue
@@ -214,6 +222,17 @@ def in_time(
             return Timed(reason=Reason(f"the schedule is no plan in time: {said}"))
         moved = {turn for resource, line in enumerate(found.turns) for turn in line if turn[0] != resource}
         choices = replace(choices, of={turn: able for turn, able in choices.of.items() if moved and turn not in moved})
+
+
+def _with_events(problem: Problem, timed: TimedPlan, missing: Mapping[str, Fraction]) -> Plan:
+    """Return the plan with missing external events, each after all steps of the plan that begin before the event."""
+    begin = {slot.step.path: slot.begin for slot in timed.slots}
+    steps = list(timed.plan.steps)
+    for name, at in missing.items():
+        before = (i for i, step in enumerate(steps, 1) if any(begin.get(s.path, at) < at for s in step.walk()))
+        event = Step((), problem.id_of(name, ()), problem.domain.behaviors[name].level, name, ())
+        steps.insert(max(before, default=0), event)
+    return replace(timed.plan, steps=renumbered(steps))
 
 
 def _late(

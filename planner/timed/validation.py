@@ -68,6 +68,14 @@ def validate_timed(
     return faults or list(_TimedExecution(problem, timed, separation, sequence, executed).run())
 
 
+def omitted(problem: Problem, timed: TimedPlan) -> dict[str, Fraction]:
+    """Return the external events that a timed plan omits although it lasts until their times, in the order of the times."""
+    events = (problem.times or Times()).events
+    its = {slot.step.behavior for slot in timed.slots}
+    end = max((slot.end for slot in timed.slots if slot.step.behavior not in events), default=Fraction(0))
+    return {name: at for name, at in sorted(events.items(), key=lambda one: one[1]) if name not in its and at <= end}
+
+
 def validate_in_sequence(problem: Problem, plan: Plan) -> list[Fault]:
     """Return the faults of a plan if its primitives begin and end one after another, without regard to times."""
     slots = tuple(Slot(step, Fraction(i), Fraction(i + 1)) for i, step in enumerate(plan.primitives))
@@ -211,17 +219,14 @@ class _TimedExecution:
 
     def happenings(self) -> Iterator[Fault]:
         """Yield the external events that the plan repeats, or that it omits although it lasts until their times."""
-        its, end = defaultdict[str, list[Step]](list), Fraction(0)
+        its = defaultdict[str, list[Step]](list)
         for slot in self.timed.slots:
-            if slot.step.behavior in self.times.events:
-                its[slot.step.behavior].append(slot.step)
-            else:
-                end = max(end, slot.end)
+            its[slot.step.behavior].append(slot.step)
         for name, at in self.times.events.items():
             for again in its[name][1:]:
                 yield Fault(again.path, f"{again}: it happens only once, at {at} s")
-            if not its[name] and at <= end:
-                yield Fault((), f"{name} happens at {at} s, before the plan ends, and isn't in the plan")
+        for name, at in omitted(self.problem, self.timed).items():
+            yield Fault((), f"{name} happens at {at} s, before the plan ends, and isn't in the plan")
 
     def begun(self, number: int, slot: Slot, time: Fraction) -> Iterator[Fault]:
         """Begin a step; yield its faults."""

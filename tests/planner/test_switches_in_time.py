@@ -53,13 +53,25 @@ WORK = (
 DONE = node("task", "Task", "", " ; c:goal :done") + node("done", "ValueCondition", "b")
 
 
-@pytest.mark.parametrize(("seconds", "status"), [(5, Status.GAVE_UP), (10, Status.GAVE_UP), (12, Status.SOLVED)])
+@pytest.mark.parametrize(("seconds", "status"), [(5, Status.GAVE_UP), (10, Status.SOLVED), (12, Status.SOLVED)])
 def test_an_external_event_happens_although_no_goal_needs_it(seconds: int, status: Status, tmp_path: Path) -> None:
     shut = node("SHUT", "Behavior", "", f"{FIRST} ; c:postcondition :off{lasts(0)}{lasts(seconds, 'happensAt')}")
     off = node("off", "ValueEffect", "a", " ; c:negated true")
     outcome = load(tmp_path, WORK, shut.replace("index 1", "index 2"), off, DONE).plan(minimise="makespan").outcome
     assert outcome.status is status
     assert (f"SHUT happens at {seconds} s" in str(outcome.reason)) is (status is Status.GAVE_UP)
+
+
+def test_an_event_that_changes_nothing_is_a_step_of_the_plan_above_any_level(tmp_path: Path) -> None:
+    event = node(
+        "OPEN", "Behavior", "", f" ; c:level 2 ; c:index 2 ; c:postcondition :opens{lasts(0)}{lasts(4, 'happensAt')}"
+    )
+    upper = node("BEGIN", "Behavior", "", f"{FIRST} ; c:postcondition :begins") + node("begins", "ValueEffect", "b")
+    scene = load(tmp_path, WORK.replace("level 1", "level 2"), upper, event, node("opens", "ValueEffect", "b2"), DONE)
+    result = scene.plan(minimise="makespan")
+    assert [step.behavior for step in result.plan.primitives] == ["WORK", "OPEN"]
+    assert [step.behavior for step in result.plan.steps] == ["BEGIN", "OPEN"]
+    assert "undo each other" not in result.dearer()
 
 
 @pytest.mark.parametrize("proved", [False, True])
