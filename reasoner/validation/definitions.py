@@ -269,12 +269,15 @@ def _properties_in(node: object, inside: Mapping[object, Sequence[ox.Triple]]) -
 
 
 def _above(case: ReadCase, iri: str) -> set[str]:
-    """Return the classes that contain every member of a defined class: the conjuncts of its definition and their superclasses."""
+    """Return the classes that contain every member of a defined class: equivalent classes, conjuncts, and their superclasses."""
     schema = case.reading.schema
 
     def conjuncts(kind: str) -> Iterator[str]:
         for node in schema.expressions.get(kind, {}).get(OWL + "equivalentClass", ()):
             yield from (part for part in (node, *_items(schema.expressions, node)) if ":" in part)
+        yield from (
+            other for other, node in schema.expressions.items() if kind in node.get(OWL + "equivalentClass", ())
+        )
 
     return closure([*closure(conjuncts(iri), conjuncts), OWL + "Thing"], lambda kind: schema.supers.get(kind, ()))
 

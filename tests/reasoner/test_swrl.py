@@ -186,6 +186,13 @@ def test_an_axiom_that_planning_does_not_evaluate_is_an_error(yard: Yard, more: 
     assert len(findings) == bool(said)
 
 
+@pytest.mark.parametrize("kind", [":Box", every(":Thing", some(":liesIn", "owl:hasValue :room1"))])
+def test_two_names_of_one_class_are_no_fault(yard: Yard, kind: str) -> None:
+    of = f":Odd a owl:Class, owl:NamedIndividual ; owl:equivalentClass {kind} . :Same a owl:Class ; owl:equivalentClass :Odd ."
+    said = {one.rule for one in check([yard(of)])}
+    assert not said & {"subclass-cycle", "axiom-not-watched"}
+
+
 @pytest.mark.parametrize("number", ["-1", '"several"'])
 def test_a_class_counts_whole_numbers(yard: Yard, number: str) -> None:
     path = yard("")
