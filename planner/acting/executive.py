@@ -156,14 +156,17 @@ class _RunningEpisode:
     # --------------------------------------------------------------------------------------------------- beginning, end
 
     def start(self, plan: Plan | None) -> None:
-        """Make a plan, unless the caller has given one."""
+        """Make a plan, unless the caller has given one.
+
+        Nothing waits for the first plan: only the current deadline limits its time, as in a planning call without execution.
+        """
         record = self.record
         record.initial = self.belief.state
         record.course.clear()  # the facts seen so far are the initial situation
         self.began = self.world.seconds
         self.world.announce(tuple(i for i in self.waiting if i.at is not None and i.at > self.began))
         self.want_soft_goals()
-        begun, outcome, limits = plan, None, self.retries.policy.planning
+        begun, outcome, limits = plan, None, replace(self.retries.policy.planning, seconds=None)
         if begun is None:
             self.requested = ""
             self.set_aside_the_vanished()
@@ -181,7 +184,7 @@ class _RunningEpisode:
         self.agenda.steps, record.planned, self.agenda.planned_for = begun.steps, begun, self.belief.problem
         self.retries.most = self.retries.policy.primitives * max(len(begun.primitives), 20)
         if outcome is not None and outcome.plan is None:
-            self.on_no_plan(outcome, limits)
+            self.on_no_plan(outcome, self.retries.policy.planning)
         self.say("plan", text="; ".join(reason.text for _, reason in self.goals.aside.values()))
 
     def finish(self) -> None:

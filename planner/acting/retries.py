@@ -14,8 +14,8 @@ class RetryPolicy:
 
     `rounds` is the maximum number of times that failed steps are retried after all alternatives are exhausted, because the
     situation may have changed, or a hand may grasp differently. `rounds` also limits how often the agenda is checked in an
-    unchanged situation. `planning` limits each planning call; the whole episode ends by the current deadline
-    (`confab.reasoner.limits.within`).
+    unchanged situation. `planning` limits each planning call, but its seconds don't limit the first plan, which is made before
+    anything moves. The whole episode ends by the current deadline (`confab.reasoner.limits.within`).
     """
 
     attempts: int = 2

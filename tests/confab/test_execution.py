@@ -18,7 +18,9 @@ from confab.interchange import episode_json
 from confab.intervening import parse_interventions
 from confab.live import View, in_terminal
 from confab.planner.acting.episode import End, Event, Intervention, InterventionKind
+from confab.planner.acting.retries import RetryPolicy
 from confab.planner.acting.symbolic_world import SymbolicWorld
+from confab.planner.plan import Limits
 from confab.reasoner.graph.knowledge import KnowledgeError, KnowledgeGraph, read_into, text
 from confab.reasoner.memory.episodes import assert_episode
 from confab.reasoner.symbols import Symbol
@@ -293,6 +295,12 @@ def test_a_result_is_executed_as_it_was_planned() -> None:
     assert execution.episode.planned == result.plan
     assert execution.reached
     assert "repair" in execution._repr_html_()
+
+
+def test_an_execution_begins_with_the_plan_of_plan_however_short_the_time_for_a_later_plan_is() -> None:
+    scene = confab.load("beverage-serving")
+    execution = scene.execute(retry_policy=RetryPolicy(planning=Limits(seconds=0.0)))
+    assert execution.reached and execution.episode.planned.primitives == scene.plan().plan.primitives
 
 
 def test_a_result_of_another_scene_is_executed_as_its_plan() -> None:
