@@ -22,6 +22,7 @@ from confab.planner.possibilities import (
     compared,
 )
 from confab.reasoner.amounts import MORE, bounds, terms_of, towards, written
+from confab.reasoner.derivation import conditions_of_goal
 from confab.reasoner.language import substituted, terms, walk
 from confab.reasoner.problem import Problem
 from confab.reasoner.sentences import an, said
@@ -32,6 +33,7 @@ from confab.reasoner.symbols import (
     AnyOf,
     Behavior,
     ClassCondition,
+    Comparison,
     Condition,
     Effect,
     EqualityCondition,
@@ -79,7 +81,10 @@ class Cause:
 def told(problem: Problem, certificate: Certificate) -> Reason:
     """Return the reason, read from a certificate, why a problem has no plan."""
     goals, causes = certificate.unmet[:SHOWN], _Causes(problem, certificate)
-    what, many = " and ".join(map(str, goals)) + " …" * (len(certificate.unmet) > SHOWN), len(goals) > 1
+    what, many = (
+        " and ".join(_goal(problem, goal) for goal in goals) + " …" * (len(certificate.unmet) > SHOWN),
+        len(goals) > 1,
+    )
     how, more = "exclude each other" if many else "can't be reached", tuple[str, ...]()
     if certificate.told_apart:
         text = f"{what} {how}: {_of_cases(certificate)}"
@@ -92,6 +97,15 @@ def told(problem: Problem, certificate: Certificate) -> Reason:
         why, named = causes.why(Claim(goals[0]))
         text, more = f"{what} {how}: {why}", tuple(word for word in named if not word.startswith("?"))
     return Reason(text, tuple(dict.fromkeys((*(word for fact in goals for word in _words(fact)), *more))))
+
+
+def _goal(problem: Problem, goal: Fact) -> str:
+    """Return a goal as text; a goal about a maximum or minimum is written as its comparison."""
+    match conditions_of_goal(problem.domain, goal.symbol):
+        case (Witness(comparison=Comparison()) as wanted,) if goal.value == TRUE:
+            return said(wanted)
+        case _:
+            return str(goal)
 
 
 def _of_cases(certificate: Certificate) -> str:

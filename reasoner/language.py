@@ -98,10 +98,13 @@ def substituted(condition: Condition, terms: Mapping[str, str]) -> Condition:
             return ClassCondition(terms.get(term, term), kind, negated)
         case EqualityCondition(left, right, negated):
             return EqualityCondition(terms.get(left, left), terms.get(right, right), negated)
-        case Witness(variable, kind, conditions, negated):
+        case Witness(variable, kind, conditions, negated, comparison):
             own = f"{variable}_inside" if variable in terms.values() else variable  # avoids variable capture
             inner = {**terms, variable: own}
-            return Witness(own, kind, tuple(substituted(c, inner) for c in conditions), negated)
+            if comparison is not None:
+                sides = put_in(comparison.left, terms), put_in(comparison.right, terms)
+                comparison = Comparison(sides[0], comparison.operator, sides[1])
+            return Witness(own, kind, tuple(substituted(c, inner) for c in conditions), negated, comparison)
         case AnyOf(alternatives, negated, constraint):
             groups = tuple(tuple(substituted(c, terms) for c in group) for group in alternatives)
             return AnyOf(groups, negated, constraint)

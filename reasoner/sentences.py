@@ -60,6 +60,8 @@ def said(condition: Condition, words: Words = str) -> str:
             return f"{words(term)} is {f'no {words(kind)}' if negated else an(words(kind))}"
         case EqualityCondition(left, right, negated):
             return f"{words(left)} is {'not ' if negated else ''}{words(right)}"
+        case Witness(comparison=Comparison() as comparison):
+            return said(replace(comparison, negated=condition.negated), words)
         case Witness(variable, kind, conditions, negated):
             return _sought(variable, words(kind), conditions, negated, words)
         case AnyOf(constraint=Constraint(_, _, (once,))):

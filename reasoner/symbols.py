@@ -160,13 +160,15 @@ class Witness:
     """The condition that some individual of class `kind`, denoted by `variable`, satisfies all `conditions`.
 
     A negated witness is the condition that no individual satisfies all `conditions`. "The location is free" is
-    ``Witness("?o", "Movable", (LOCATION(?o) = ?l,), negated=True)``.
+    ``Witness("?o", "Movable", (LOCATION(?o) = ?l,), negated=True)``. If a witness that isn't negated expresses a comparison with a
+    maximum or minimum, `comparison` is this comparison, which messages show.
     """
 
     variable: str
     kind: str
     conditions: tuple[Condition, ...]
     negated: bool = False
+    comparison: Comparison | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,7 @@ def _of_extremum(condition: Comparison, read: Amount, aggregates: Mapping[str, A
     inner = with_extrema(
         [*conditions, _sought(other[2], exceeding, True), replace(compared, negated=False)], aggregates
     )
-    return _sought(variables, inner, condition.negated)
+    return replace(_sought(variables, inner, condition.negated), comparison=replace(condition, negated=False))
 
 
 def _solution(
@@ -86,9 +86,9 @@ def _solution(
     return conditions, put_in(aggregate.amount, terms), tuple(variables)
 
 
-def _sought(variables: Sequence[Parameter], conditions: tuple[Condition, ...], negated: bool) -> Condition:
+def _sought(variables: Sequence[Parameter], conditions: tuple[Condition, ...], negated: bool) -> Witness:
     """Return the condition that some individuals satisfy conditions or, if `negated`, that no individuals do."""
-    found: Condition | None = None
+    found: Witness | None = None
     for variable in reversed(variables):
         found = Witness(variable.name, variable.kind, conditions if found is None else (found,))
     assert found is not None

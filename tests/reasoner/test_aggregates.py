@@ -215,3 +215,20 @@ def test_a_maximum_with_a_bound_and_a_goal_about_one_in_words_are_refused(tmp_pa
         confab.load(tmp_path / "bound.ttl").plan()
     with pytest.raises(KnowledgeError, match="HEAVIEST is a max; state such a goal in the scene"):
         confab.load("carts-small").plan("cart HEAVIEST >=1")
+
+
+def test_a_goal_about_a_maximum_is_told_as_its_comparison(tmp_path: Path) -> None:
+    of_watts = LAMPS.replace("COUNT(?l)", "MAX(?w)").replace(":ON true } GROUP", ":ON true ; :watts ?w } GROUP")
+    before, _, after = of_watts.replace(" ; c:mostAmount 1 .", " .").partition(":task a ")
+    assert after
+    goal = ":task a owl:NamedIndividual, c:Task ; c:goal :task.one . :task.one a owl:NamedIndividual, c:Comparison ;"
+    goal += ' c:about :house ; c:situationType :LAMPS ; c:sign ">=" ; c:amount 80.0'
+    for name, end in (("hard", " ."), ("soft", " ; c:weight 1 .")):
+        (tmp_path / f"{name}.ttl").write_text(f"{before}{WATTS} :l1 :watts 40 . :l2 :watts 60 . {goal}{end}")
+    scene = confab.load(tmp_path / "hard.ttl")
+    outcome = scene.plan().outcome
+    assert outcome.status is Status.UNSOLVABLE
+    assert outcome.reason is not None and outcome.reason.text.startswith("house LAMPS >= 80 can't be reached")
+    assert "The goal requires that house LAMPS at least 80; this never holds." in str(scene.plan().explain())
+    (left,) = confab.load(tmp_path / "soft.ttl").plan().outcome.forgone
+    assert ", which means house LAMPS >= 80 (weight 1" in str(left)
