@@ -29,7 +29,7 @@ from confab.checking import refused
 from confab.known import Known
 from confab.plan_options import NO_ENGINE, PlanOptions
 from confab.planner.certified import certified
-from confab.planner.plan import Forgone, Limits, Outcome, Plan, Reason, Shortening, Status
+from confab.planner.plan import Counts, Forgone, Limits, Outcome, Plan, Reason, Shortening, Status
 from confab.planner.plan_costs import compared, cost_of
 from confab.planner.solve import DEFAULT_MODE, Request, solve, unchecked
 from confab.planner.timed.plan import schedule_of
@@ -298,6 +298,11 @@ def choose_and_search(task: PlanningTask, problem: Problem) -> tuple[Problem, Ou
     bounded, worked = first._replace(share=CHOICE, most_work=CHOICE_WORK), 0
     kept = (seconds or 0.0) * (KEPT_IN_TIME if asks_for_times(problem, task.options.minimise) else KEPT)
     known: dict[tuple[object, ...], Outcome] = {}
+    searches, begin = list[Outcome](), perf_counter()
+
+    def counted(found: Outcome) -> Outcome:
+        searches.append(found)
+        return found
 
     def comparing(choice: Problem) -> Searching:
         if choice.goal.keys().isdisjoint(problem.weights):
@@ -317,18 +322,18 @@ def choose_and_search(task: PlanningTask, problem: Problem) -> tuple[Problem, Ou
 
     def choose(choice: Problem) -> Outcome:
         limit = "half of the time limit, which is for a cheaper plan or proofs"
-        found = search_in_time(task, comparing(choice), (seconds or 0.0) / 2, limit, choice)
+        found = counted(search_in_time(task, comparing(choice), (seconds or 0.0) / 2, limit, choice))
         nonlocal worked
         worked = max(worked, found.effort if found.plan is not None else 0)
         return in_its_times(choice, found)
 
     def shorten(choice: Problem, found: Outcome, briefly: bool) -> Outcome:
         how = comparing(choice)._replace(shortening="brief") if briefly else Searching(mode)
-        return search(task, choice, how._replace(first=found))
+        return counted(search(task, choice, how._replace(first=found)))
 
     def extended(choice: Problem, found: Outcome) -> Outcome:
         how = bounded._replace(first=found)
-        return in_its_times(choice, search_in_time(task, how, kept, "the time limit", choice))
+        return in_its_times(choice, counted(search_in_time(task, how, kept, "the time limit", choice)))
 
     fixed = task.options.by_engine or mode == "paper"
     extend = None if fixed else extended
@@ -339,10 +344,20 @@ def choose_and_search(task: PlanningTask, problem: Problem) -> tuple[Problem, Ou
 
         def prove(choice: Problem) -> Outcome:
             how = Searching(mode, share=0.5)
-            return in_its_times(choice, search_in_time(task, how, least, "the time limit", choice))
+            return in_its_times(choice, counted(search_in_time(task, how, least, "the time limit", choice)))
 
         chosen, outcome = preferred(alike, choose, prove, extend=extend)
+    outcome = replace(outcome, search=counts_of(searches), seconds=perf_counter() - begin)
     return replace(problem, goal=chosen.goal, weights=chosen.weights), outcome
+
+
+def counts_of(outcomes: Sequence[Outcome]) -> dict[int, Counts]:
+    """Return the sums of the counts of searches, by levels."""
+    total: dict[int, Counts] = {}
+    for outcome in outcomes:
+        for level, counts in sorted(outcome.search.items()):
+            total.setdefault(level, Counts()).add(counts)
+    return total
 
 
 def search_in_time(task: PlanningTask, how: Searching, least: float, limit: str, problem: Problem) -> Outcome:
