@@ -34,7 +34,7 @@ from confab.reasoner.memory.experience import (
 )
 from confab.reasoner.memory.experience_file import MemoryLines, new_replica, parse, pull, push, turtle
 from confab.reasoner.memory.links import Links
-from confab.reasoner.memory.links_file import links_text, load_links, memory_lines, memory_names, of_another_kind
+from confab.reasoner.memory.links_file import links_text, load_links, memory_lines, memory_names, refuse_another_kind
 from confab.reasoner.names import Names, RightNames, right_names
 from confab.table import Table
 
@@ -149,8 +149,8 @@ class Memory(metaclass=RightNames):
             if ":memoryFormat" in lines.rest or "core#memoryFormat" in lines.rest:
                 found.experience = parse(lines, str(path), names)
             elif not len(found.links):
-                why = of_another_kind(path) or "holds no memory; without it, 'confab learn' makes a new one"
-                raise KnowledgeError(f"{path}: {why}")
+                refuse_another_kind(path)
+                raise KnowledgeError(f"{path}: holds no memory; without it, 'confab learn' makes a new one")
         found.labels = _labels(scene) if scene is not None else None
         found.trusted.update(found.experience.episodes if trust else found.experience.trusts)
         return found

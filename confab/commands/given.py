@@ -104,12 +104,10 @@ def memory_for(path: Path | None, none: bool, scene: Scene, new: bool = False) -
                 remark(f"{path} has terms that this scene doesn't have: {'; '.join(unknown[:NAMED])}{more}")
         return Memory.load(path, scene, lines=lines)
     except KnowledgeError as error:
-        from confab.reasoner.memory.links_file import of_another_kind
+        from confab.reasoner.memory.links_file import AnotherKindError
 
-        if not path.is_file():
+        if not path.is_file() or isinstance(error, AnotherKindError):
             raise
-        if of_another_kind(path):
-            raise KnowledgeError("wanted a memory") from error
         remark(f"{error}; planning continues without memory")
         return None
 

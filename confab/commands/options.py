@@ -130,9 +130,12 @@ class Command(click.Command):
             raise SystemExit(end.exit_code) from end
         except KnowledgeError as error:
             from confab.commands.misplaced import correction
+            from confab.reasoner.memory.links_file import AnotherKindError
 
             if right := correction(ctx, ctx.meta[GIVEN], known=True):
                 said = f"{error}; " * (len(str(error)) <= SHORT)
+                if isinstance(error, AnotherKindError):  # the correct command line begins with the kind of the file
+                    said = "wanted a memory; "
                 raise KnowledgeError(said + right) from error
             raise
 

@@ -65,12 +65,12 @@ class Remote(Protocol):
 class KnowledgeError(ValueError):
     """Raised if the given knowledge can't be used; the message states the fault, its position and the remedy.
 
-    `node` is the IRI of the faulty node, or an empty text.
+    `node` is the IRI of the faulty node, or an empty text. `rule` is the name of the validation rule that the fault violates.
     """
 
-    def __init__(self, message: str = "", node: str = "") -> None:
+    def __init__(self, message: str = "", node: str = "", rule: str = "unreadable") -> None:
         super().__init__(message)
-        self.node = node
+        self.node, self.rule = node, rule
 
 
 def text(term: Term) -> str:

@@ -129,19 +129,20 @@ def _graph(path: Path, found: MemoryLines | None = None) -> KnowledgeGraph:
     try:
         graph.extend("memory", ox.parse(rest, format=ox.RdfFormat.TURTLE, base_iri=path.resolve().as_uri()))
     except SyntaxError as error:
-        why = of_another_kind(path) or f"broken memory: {error}; plan with memory=None, or restore a copy"
-        raise KnowledgeError(f"{path}: {why}") from error
+        refuse_another_kind(path)
+        raise KnowledgeError(f"{path}: broken memory: {error}; plan with memory=None, or restore a copy") from error
     return graph
 
 
-def of_another_kind(path: Path) -> str:
-    """Return as text that a file has a known kind of content other than a memory; otherwise, return an empty text."""
+class AnotherKindError(KnowledgeError):
+    """Raised if a file that should be a memory has a known kind of content other than a memory."""
+
+
+def refuse_another_kind(path: Path) -> None:
+    """Raise `AnotherKindError` if a file has a known kind of content other than a memory."""
     kind = kinds.kind_of(path)
-    return (
-        ""
-        if kind is None or kind.name in (kinds.MEMORY, "a text")
-        else f"is {kind}; wanted a memory, which 'confab learn' makes"
-    )
+    if kind is not None and kind.name not in (kinds.MEMORY, "a text"):
+        raise AnotherKindError(f"{path}: is {kind}; wanted a memory, which 'confab learn' makes")
 
 
 def _triples(links: Links, names: Names, iri: str) -> Iterator[ox.Triple]:

@@ -203,4 +203,5 @@ def check_values(state: State, domain: Domain, names: Names) -> None:
     for fault in values_at_fault(state, domain, names):
         constraint = domain.constraints.get(fault.symbol.situation)
         about = next(iter(fault.symbol.arguments), "") if constraint is None else constraint.situation
-        raise KnowledgeError(str(fault), names.iri(about) if about in names else "")
+        rule = "unreadable" if constraint is None else "violated-constraint"
+        raise KnowledgeError(str(fault), names.iri(about) if about in names else "", rule)

@@ -139,8 +139,9 @@ class VariableScope:
         if said in self.numbers:
             raise UpdateError(f"{said} is a number in the place of an individual", "name an individual", said.at)
         if said not in known:
+            local = f" here; another {said} is local to its braces" if said in self.terms else ""
             raise UpdateError(
-                f"nothing determines the variable {said}",
+                f"nothing determines the variable {said}{local}",
                 f"state its type ({said} a …), or add a situation with {said} as its value (?x :property {said})",
                 said.at,
             )

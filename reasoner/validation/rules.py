@@ -49,6 +49,7 @@ WARNINGS = frozenset(
         "axiom-not-watched",
         "crowded",
         "every-member-required",
+        "file-name-and-iri",
         "number-missing",
         "number-missing-for-member",
         "other-kind",

@@ -73,9 +73,14 @@ def _undeclared(case: Case) -> Iterator[tuple[object, str, str, set[str]]]:
                 yield triple.subject, iri, wanted, kinds
 
 
+def with_undeclared(case: Case) -> set[str]:
+    """Return the nodes that mention undeclared terms directly."""
+    return {subject.value for subject, *_ in _undeclared(case) if isinstance(subject, ox.NamedNode)}
+
+
 def misread(case: Case) -> set[str]:
     """Return the nodes that mention undeclared terms, relative IRIs or owl:Thing, directly or through another node."""
-    first = {subject.value for subject, *_ in _undeclared(case) if isinstance(subject, ox.NamedNode)} | case.relative
+    first = with_undeclared(case) | case.relative
     first |= {
         triple.subject.value
         for triple in case.triples

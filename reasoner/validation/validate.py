@@ -43,7 +43,7 @@ from confab.reasoner.validation.case import Case, ReadCase
 from confab.reasoner.validation.contradictions import impossible_situations
 from confab.reasoner.validation.findings import ERROR, REMARK, WARNING, Finding, Places, fill, unique
 from confab.reasoner.validation.rules import REMARKS, RULES, RULES_ON_PROBLEMS, WARNINGS
-from confab.reasoner.validation.terms import misread
+from confab.reasoner.validation.terms import misread, with_undeclared
 from confab.reasoner.vocabulary import CORE, EMBODIMENT, PREFIXES, RDF, SHACL
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ def quick_errors(graph: KnowledgeGraph) -> list[Finding]:
     found = [finding for finding in _violations(graph, places) if finding.serious]
     case, problem = _read(graph)
     if problem and not found:
-        found.append(_unreadable(graph, places, problem))
+        found += _unread(case, places, problem)
     sure = [*_sure(found, case)]
     return unique(finding for finding in (*sure, *_by_rules(case, places, sure)) if finding.serious)
 
@@ -193,7 +193,7 @@ def _validate_one(file: str | Path, deep: bool, done: Callable[[str], object]) -
         yield from (finding for finding in undeclared if not any(part in finding.remedy for part in parts))
         return
     if problem and not any(finding.serious for finding in found):
-        yield _unreadable(graph, places, problem)
+        yield from _unread(case, places, problem)
     if not any(finding.serious for finding in found):
         yield from _measured(case, places)
     yield from _by_rules(case, places, found)
@@ -263,18 +263,27 @@ def _read(graph: KnowledgeGraph) -> tuple[Case, KnowledgeError | None]:
         return Case(graph), KnowledgeError(f"{type(error).__name__}: {error}")
 
 
+def _unread(case: Case, places: Places, problem: KnowledgeError) -> Iterator[Finding]:
+    """Yield a finding about an unreadable file, unless the fault is about a node with an undeclared term, which is a finding."""
+    finding = _unreadable(case.graph, places, problem)
+    if finding.node not in with_undeclared(case):
+        yield finding
+
+
 def _unreadable(graph: KnowledgeGraph, places: Places, problem: KnowledgeError) -> Finding:
     """Return a finding with the error message about an unreadable file, at the node that the message mentions."""
     why, said = "the planner reads the file in the same way", str(problem)
+    if problem.rule == "violated-constraint":
+        why = "constraints hold in every state, from the first one on"
     named = [problem.node, *re.findall(r"<([^<>\s]+:[^<>\s]+)>", said)]
     what, mark, remedy = said.rpartition("; ")
     for node in filter(None, named):
         if next(graph.store.quads_for_pattern(ox.NamedNode(node), None, None, None), None) is not None:
             return places.finding(
-                "unreadable", node, what if mark else said, why, remedy if mark else "see the message"
+                problem.rule, node, what if mark else said, why, remedy if mark else "see the message"
             )
     return Finding(
-        str(graph.path), 0, graph.scene, places.label(graph.scene), "unreadable", said, why, "see the message"
+        str(graph.path), 0, graph.scene, places.label(graph.scene), problem.rule, said, why, "see the message"
     )
 
 

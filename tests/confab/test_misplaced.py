@@ -9,6 +9,7 @@ import pytest
 
 import confab
 from confab.cli import main
+from tests.ontology.faults import skeleton
 
 SCENE = "beverage-serving-moved"
 GOAL = "cup2 LOCATION location8"
@@ -135,3 +136,14 @@ def test_verify_without_a_plan_makes_a_plan_and_report_shows_a_given_plan(
     with pytest.raises(SystemExit, match="0"):
         main(["report", SCENE, "--plan", str(files / "plan.json"), "-o", str(tmp_path / "page.html")])
     assert "solved" in capsys.readouterr().out
+
+
+def test_a_scene_in_the_place_of_a_memory_is_named_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    name = skeleton(tmp_path).name
+    with pytest.raises(SystemExit, match="2"):
+        main(["memory", "show", name])
+    wanted = f"confab: wanted a memory; {name} is a scene; use: confab plan {name} | "
+    assert capsys.readouterr().err.startswith(wanted)

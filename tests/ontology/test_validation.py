@@ -365,3 +365,18 @@ def test_an_earlier_state_of_other_individuals_is_a_fault_unless_an_individual_c
     fault = next(fault for fault in FAULTS if fault.rule == "earlier-state-of-others")
     rules = [one.rule for one in found(replace(fault, new=f"{fault.new}\n{shared}"), tmp_path)]
     assert (fault.rule in rules) == asked
+
+
+def test_a_misspelt_property_with_a_text_as_its_value_is_one_finding(tmp_path: Path) -> None:
+    scene = skeleton(tmp_path)
+    scene.write_text(scene.read_text(encoding="utf-8") + "d:PLACE c:atmostOnce true .\n", encoding="utf-8")
+    (finding,) = (finding for finding in validate([scene]) if finding.serious)
+    assert finding.rule == "undeclared-term" and "did you mean 'atMostOnce'?" in finding.what
+    assert [finding.rule for finding in quick_errors(confab.load(scene).knowledge)] == ["undeclared-term"]
+
+
+def test_a_scene_in_a_file_with_another_name_has_a_warning_and_no_error(tmp_path: Path) -> None:
+    copied = skeleton(tmp_path).rename(tmp_path / "copied.ttl")
+    (finding,) = validate([copied])
+    assert (finding.rule, finding.severity) == ("file-name-and-iri", "warning")
+    assert quick_errors(confab.load(copied).knowledge) == []

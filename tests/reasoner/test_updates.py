@@ -152,6 +152,12 @@ def faults(folder: Path, text: str) -> list[UpdateFault]:
         (HEAD + "; :spto ?x }", ":spto is neither a property", "correct the name", (1, len(HEAD) + 3)),
         (HEAD + "}\nFILTER (?a)", "'FILTER' isn't expected here", "write DELETE", (2, 1)),
         (HEAD + ".\n ?a :fits ?slot }", "nothing determines the variable ?a", "state its type", (2, 2)),
+        (
+            HEAD + ".\n FILTER EXISTS { ?a a :Slot . ?tube :fits ?a } ?a :fits ?slot }",
+            "nothing determines the variable ?a here; another ?a is local to its braces",
+            "state its type",
+            (2, 48),
+        ),
         (HEAD + ".\n ?tube :fits/:fits ?slot }", "a path isn't supported", "a pattern for each step", (2, 8)),
         (HEAD + ".\n OPTIONAL { ?tube :fits ?slot } }", "OPTIONAL isn't supported", "a further operation", (2, 13)),
         (HEAD + ".\n MINUS { ?tube :fits ?slot } }", "MINUS isn't supported", "FILTER NOT EXISTS", (2, 10)),
