@@ -316,7 +316,7 @@ class Timing:
 
 @dataclass(frozen=True)
 class Times:
-    """The times of a task, in seconds from the beginning of the plan.
+    """The times of a task, in seconds from the beginning of the plan, or from the later moment `since`.
 
     Attributes
     ----------
@@ -331,6 +331,8 @@ class Times:
         The fixed times of events, which no actor executes (PDDL's timed initial literals).
     of_actors : mapping of (behaviour, actor) to seconds
         The average measured duration of a behaviour by a certain actor, which is used in place of the average over all actors.
+    since : seconds
+        The moment from which the times count, in seconds from the beginning of the plan. Reasons state times from the beginning.
     """
 
     deadlines: Mapping[Symbol, Fraction] = field(default_factory=dict)
@@ -338,6 +340,7 @@ class Times:
     measured: Mapping[str, Fraction] = field(default_factory=dict)
     events: Mapping[str, Fraction] = field(default_factory=dict)
     of_actors: Mapping[tuple[str, str], Fraction] = field(default_factory=dict)
+    since: Fraction = Fraction(0)
 
 
 # ---------------------------------------------------------------------------------------------------------- behaviours

@@ -58,6 +58,7 @@ def later(times: Times, seconds: Fraction) -> Times:
         deadlines={goal: by - seconds for goal, by in times.deadlines.items()},
         windows={one: tuple(_open(its, seconds)) for one, its in times.windows.items()},
         events={name: at - seconds for name, at in times.events.items() if at >= seconds},
+        since=times.since + seconds,
     )
 
 

@@ -243,6 +243,10 @@ def _late(
     The reason names what the activity with the greatest lateness misses: time windows of individuals, deadlines, or a fixed time.
     """
     i, times = found.begins.latest, problem.times or Times()
+
+    def at(seconds: Fraction) -> str:
+        return f"{float(times.since + seconds):g}"
+
     one, renamed = order.activities[i], renamed_by(order, found.turns)
     step = exchanged(problem, plan, renamed).primitives[i]
     begin = found.begins.begins[i] * network.unit
@@ -251,23 +255,29 @@ def _late(
     for individual in dict.fromkeys((*step.arguments, *(renamed.get(i, {}).get(a, a) for a in one.actors))):
         windows = times.windows.get(individual)
         if windows is not None and not any(low <= begin and (high is None or end <= high) for low, high in windows):
-            missed.append(f"{individual} is available only {' and '.join(map(_written, windows))}")
+            missed.append(
+                f"{individual} is available only {' and '.join(_window(its, times.since) for its in windows)}"
+            )
     for symbol, (changing, which, by) in order.latest.items():
         if changing == i and (end if which == END else begin) > by:
-            missed.append(f"{said_by(problem, symbol)} is a goal by {float(by):g} s")
+            missed.append(f"{said_by(problem, symbol)} is a goal by {at(by)} s")
     if one.at is not None and begin > one.at:
-        missed.append(f"it happens at {float(one.at):g} s")
+        missed.append(f"it happens at {at(one.at)} s")
     return Reason(
         f"no schedule was found that keeps all windows and deadlines; in the best one found, {step} "
-        f"takes from {float(begin):g} to {float(end):g} s, but {', and '.join(missed)}",
+        f"takes from {at(begin)} to {at(end)} s, but {', and '.join(missed)}",
         (str(step),),
     )
 
 
-def _written(window: tuple[Fraction, Fraction | None]) -> str:
-    """Return a time window as text."""
+def _window(window: tuple[Fraction, Fraction | None], since: Fraction) -> str:
+    """Return a time window, whose times count from `since`, as text."""
     low, high = window
-    return f"from {float(low):g} s on" if high is None else f"from {float(low):g} to {float(high):g} s"
+    return (
+        f"from {float(since + low):g} s on"
+        if high is None
+        else f"from {float(since + low):g} to {float(since + high):g} s"
+    )
 
 
 def renamed_by(order: Order, turns: Sequence[Sequence[TurnId]]) -> dict[int, dict[str, str]]:

@@ -127,7 +127,15 @@ def test_later_times_leave_out_what_is_over() -> None:
         deadlines={FILLED: Fraction(2)},
         windows={"a": ((Fraction(0), Fraction(10)), (Fraction(20), None))},
         events={"NOON": Fraction(2)},
+        since=Fraction(10),
     )
+
+
+def test_the_reason_why_the_remaining_steps_have_no_schedule_states_times_from_the_beginning_of_the_plan() -> None:
+    problem = with_times(windows={hand: ((Fraction(0), Fraction(22)),) for hand in ("left_hand", "right_hand")})
+    episode = acted(problem, Intervention(InterventionKind.WORLD, (Fact(MOVED, "location8"),), at=8.2))
+    assert episode.status is End.GAVE_UP
+    assert "but left_hand is available only from 9 to 22 s" in episode.reasons[0].text
 
 
 @pytest.mark.parametrize(("at", "stopped"), [(4.2, 0), (8.2, 1), (9.2, 0), (10.2, 1), (16.2, 1)])
