@@ -199,9 +199,20 @@ class _Causes:
             if facts:
                 yield f"{_listed(facts)} {what} hold{'s' * (len(facts) == 1)}"
 
-    def reading(self) -> tuple[FactEvaluation, _ClaimRecorder]:
-        """Return the reader of conditions, and the view that records the used claims."""
-        view = _ClaimRecorder(self.claims, ())
+    def limits(self, symbol: Symbol) -> str:
+        """Return the bounds of an amount as text, or an empty text if it has no bounds."""
+        found = self.lowest.allowed(symbol)
+        ends = (("least", found.low), ("most", found.high))
+        stated = [f"at {end} {written(number)}" for end, number in ends if isinstance(number, Fraction)]
+        return f"{_named(symbol)} is {' and '.join(stated)}" if stated else ""
+
+    def reading(self, amounts: bool = True) -> tuple[FactEvaluation, _ClaimRecorder]:
+        """Return the reader of conditions, and the view that records the used claims, of amounts only if `amounts`."""
+        claims = self.claims
+        if not amounts:
+            always = {s: v for s, v in self.certificate.always.items() if self.lowest.quantity(s.situation) is None}
+            claims = Claims(self.lowest, replace(self.certificate, always=always))
+        view = _ClaimRecorder(claims, ())
         return FactEvaluation(self.lowest, view), view
 
     def chain(self, goal: Claim) -> tuple[list[Claim], Cause]:
@@ -300,7 +311,7 @@ class _Causes:
                 found.append(self.lacking(claim, behavior, (*behavior.preconditions, *effect.when, *classes), bound))
         found = [cause for cause in found if cause.text]
         if amount and not found and self.kept(claim):
-            return [Cause(f"{_named(symbol)} is always {fact.value}")]
+            return [Cause(f"no behaviour of level {lowest.level} {_leaving(fact)}")]
         if amount and not found:
             return [Cause(f"no behaviour of level {lowest.level} gives {self.direction(fact)}")]
         if not found:
@@ -378,7 +389,7 @@ class _Causes:
         if core is None:
             return self.out_of_bounds(behavior, conditions, given)
         opened, kinds, witness = core, dict(behavior.kinds), core[0]
-        if len(core) == 1 and isinstance(witness, Witness) and not witness.negated:
+        if len(core) == 1 and isinstance(witness, Witness) and not witness.negated and witness.comparison is None:
             kinds[witness.variable] = witness.kind
             inner = self.core(self.lowest.inside(witness), given, behavior, kinds)
             opened = [c for c in inner or core if not (isinstance(c, ClassCondition) and c.term == witness.variable)]
@@ -386,7 +397,16 @@ class _Causes:
         reading, view = self.reading()
         inside = {c.term: c.kind for c in opened if isinstance(c, ClassCondition) and not c.negated and c.term in kinds}
         any(True for _ in reading.solutions(with_classes(opened, given, kinds), given, {**kinds, **inside}))
-        text = self.words(opened, given, kinds)
+        text, limits = self.words(opened, given, kinds), ""
+        if any(self.lowest.quantity(fact.symbol.situation) is not None for fact in view.claimed):
+            unclaimed = self.reading(amounts=False)
+            if not any(
+                True for _ in unclaimed[0].solutions(with_classes(opened, given, kinds), given, {**kinds, **inside})
+            ):
+                view = unclaimed[1]
+                bounded = [*filter(None, map(self.limits, view.read))]
+                limits = " and ".join(bounded[:SHOWN]) + " …" * (len(bounded) > SHOWN)
+                text += f", because {limits}" * bool(limits)
         names = tuple(
             word
             for condition in opened
@@ -402,6 +422,8 @@ class _Causes:
             if free and free <= kinds.keys():  # for all individuals at once, if possible
                 of_all = Fact(Symbol(first.situation, first.arguments), first.value)
                 claims.insert(0, Claim(of_all, tuple((term, kinds[term]) for term in sorted(free))))
+        if limits and not claims and conditions_of_goal(self.problem.domain, claim.fact.symbol):
+            return Cause(limits, names)
         return Cause(f"{behavior.name} requires {text}", (behavior.name, *names), tuple(claims), len(opened))
 
     def core(
@@ -538,6 +560,7 @@ class _ClaimRecorder(CaseView):
     """A view of a case that records which claims made facts impossible."""
 
     claimed: dict[Fact, None] = field(default_factory=dict)
+    read: dict[Symbol, None] = field(default_factory=dict)
 
     def may(self, symbol: Symbol, value: str) -> bool:
         """Return whether a symbol has a value in at least one state of the case."""
@@ -555,10 +578,18 @@ class _ClaimRecorder(CaseView):
 
     def between(self, symbol: Symbol) -> Range:
         """Return the range of amounts of a symbol in the case."""
+        self.read[symbol] = None
         always = self.claims.certificate.always.get(symbol)
         if always is not None:
             self.claimed[Fact(symbol, always)] = None
         return super().between(symbol)
+
+
+def _leaving(fact: Fact) -> str:
+    """Return what a behaviour does that makes a fact about an amount false, as text."""
+    ends = {">=": "below", "<=": "above"}
+    beyond = [f"{ends[sign]} {written(number)}" for sign, number in bounds(fact.value) if sign in ends]
+    return f"takes {_named(fact.symbol)} {' or '.join(beyond)}" if beyond else f"changes {_named(fact.symbol)}"
 
 
 def _end_before(found: Range, wanted: str) -> tuple[str, Fraction] | None:

@@ -232,3 +232,32 @@ def test_a_goal_about_a_maximum_is_told_as_its_comparison(tmp_path: Path) -> Non
     assert "The goal requires that house LAMPS at least 80; this never holds." in str(scene.plan().explain())
     (left,) = confab.load(tmp_path / "soft.ttl").plan().outcome.forgone
     assert ", which means house LAMPS >= 80 (weight 1" in str(left)
+
+
+@pytest.mark.parametrize(
+    ("sign", "number", "reason"),
+    [
+        (">=", 6, "house LAMPS >= 6 can't be reached: l1 WATER is at least 0 and at most 5"),
+        ("<", 3, "no behaviour of level 1 takes l1 WATER below 3; so l1 WATER >=3 always holds"),
+    ],
+)
+def test_the_reason_of_an_extremum_is_a_bound_or_that_no_behaviour_changes_an_amount(
+    tmp_path: Path, sign: str, number: int, reason: str
+) -> None:
+    goal = ":task a owl:NamedIndividual, c:Task ; c:goal :task.one . :task.one a owl:NamedIndividual, c:Comparison ;"
+    goal += f' c:about :house ; c:situationType :LAMPS ; c:sign "{sign}" ; c:amount {number}.0 .'
+    water = """
+:Lamp c:hasSituationType :WATER .
+:WATER a owl:NamedIndividual, c:SituationType, c:Amount ; c:valueProperty :water ; c:leastAmount 0.0 ; c:mostAmount 5.0 .
+:water a owl:DatatypeProperty, owl:FunctionalProperty, owl:NamedIndividual ; rdfs:domain :Lamp ; rdfs:range xsd:integer .
+:B1_FILL a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 2 ;
+  c:update "DELETE { ?l :water ?m } INSERT { ?l :water ?n } WHERE { ?l a :Lamp ; :water ?m BIND(?m + 1 AS ?n) }" .
+:l1 :water 3 . :l2 :water 4 .
+"""
+    of_water = LAMPS.replace("COUNT(?l)", "MIN(?w)").replace("?l a :Lamp ; :ON true }", "?l a :Lamp ; :water ?w }")
+    before, _, after = of_water.replace(" ; c:mostAmount 1 .", " .").partition(":task a ")
+    assert after
+    (tmp_path / "lamps.ttl").write_text(before + water + goal)
+    outcome = confab.load(tmp_path / "lamps.ttl").plan().outcome
+    assert outcome.status is Status.UNSOLVABLE
+    assert outcome.reason is not None and reason in outcome.reason.text
