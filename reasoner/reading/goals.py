@@ -90,6 +90,11 @@ def parse_fact(problem: Problem, fact: str) -> tuple[Symbol, str]:
     if name not in known:
         meant = next((each for each, situation in known.items() if name in situation.properties), "")
         near = nearest(name, authored) or _with_situation(problem, words)
+        if not meant and name in problem.relations:
+            raise KnowledgeError(
+                f"'{fact}': {name} is a relation, which never changes, and a fact or goal is about a situation; change "
+                f"{name} in the file of the scene"
+            )
         hint = f"; it is the value property of {meant}" if meant else near
         raise KnowledgeError(f"unknown situation type '{name}' in '{fact}'{hint} (known: {', '.join(authored)})")
     situation = known[name]

@@ -130,6 +130,7 @@ def test_a_new_goal_replaces_the_goal_of_the_same_symbol(serving: Reading) -> No
     [
         ("cup9 LOCATION location8", "unknown individual 'cup9'.*did you mean 'cup"),
         ("cup2 LOCATON location8", "unknown situation type 'LOCATON'.*did you mean 'LOCATION'"),
+        ("left_hand canReach location8", "canReach is a relation, which never changes"),
         ("cup2 LOCATION location99", "unknown individual 'location99'.*did you mean 'location"),
         ("cup2 LOCATION beverage1", "beverage1 is no value of LOCATION"),
         ("left_hand LOCATION location1", "left_hand has no LOCATION"),
