@@ -7,7 +7,7 @@ from dataclasses import replace
 from itertools import count
 
 from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, written
-from confab.reasoner.language import substituted
+from confab.reasoner.language import substituted, walk
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
@@ -43,12 +43,17 @@ DENIALS = {
     **{f"{verb}s": f"doesn't {verb}" for verb in REGULAR.split()},
 }
 """Verbs in the third person, with their negations."""
+ORDINALS = ("first", "second", "third", "fourth", "fifth")
+"""Words that tell different individuals of one class apart."""
 SIGNS = {">=": "at least", "<=": "at most", ">": "more than", "<": "less than", "=": "exactly"}
 """Comparison operators in words."""
 
 
-def said(condition: Condition, words: Words = str) -> str:
-    """Return a condition as a clause; `words` returns the words for facts and names."""
+def said(condition: Condition, words: Words = str, outer: tuple[str, ...] = ()) -> str:
+    """Return a condition as a clause.
+
+    `words` returns the words for facts and names; `outer` are the classes of the witnesses that contain the condition.
+    """
     match condition:
         case ValueCondition(situation, arguments, value, negated):
             if negated and value in (TRUE, FALSE):
@@ -61,9 +66,9 @@ def said(condition: Condition, words: Words = str) -> str:
         case EqualityCondition(left, right, negated):
             return f"{words(left)} is {'not ' if negated else ''}{words(right)}"
         case Witness(comparison=Comparison() as comparison):
-            return said(replace(comparison, negated=condition.negated), words)
+            return said(replace(comparison, negated=condition.negated), words, outer)
         case Witness(variable, kind, conditions, negated):
-            return _sought(variable, words(kind), conditions, negated, words)
+            return _sought(variable, kind, conditions, negated, words, outer)
         case AnyOf(constraint=Constraint(_, _, (once,))):
             return f"{words(once)} is true at most once"
         case AnyOf(constraint=Constraint(_, _, (one, other))):
@@ -71,9 +76,9 @@ def said(condition: Condition, words: Words = str) -> str:
         case AnyOf(constraint=Constraint(situation, always)):
             return f"{words(situation)} is {'always' if always else 'never'} true"
         case AnyOf(alternatives, True) if all(len(group) == 1 for group in alternatives):
-            return " and ".join(said(replace(one, negated=not one.negated), words) for (one,) in alternatives)
+            return " and ".join(said(replace(one, negated=not one.negated), words, outer) for (one,) in alternatives)
         case AnyOf(alternatives, negated):
-            either = " or ".join(" and ".join(said(inner, words) for inner in group) for group in alternatives)
+            either = " or ".join(" and ".join(said(inner, words, outer) for inner in group) for group in alternatives)
             return f"{'not ' if negated else ''}({either})"
         case Comparison(left, sign, right, negated):
             sign = SIGNS[sign] if isinstance(left, Amount) and words is not str else sign
@@ -86,11 +91,14 @@ def plain(condition: Condition) -> str:
     return said(condition).replace("?", "")
 
 
-def _sought(variable: str, kind: str, conditions: Sequence[Condition], negated: bool, words: Words) -> str:
+def _sought(
+    variable: str, named: str, conditions: Sequence[Condition], negated: bool, words: Words, outer: tuple[str, ...]
+) -> str:
     """Return the clause "some, no, or every individual of a class satisfies the conditions" in words.
 
     "Every" stands for a negated witness whose last condition is negated.
     """
+    kind = words(named)
     but = [c for c in conditions if isinstance(c, EqualityCondition) and c.negated and variable in (c.left, c.right)]
     asked = sorted((c for c in conditions if c not in but), key=lambda c: c.negated)
     which = "no" if negated else "some"
@@ -100,7 +108,7 @@ def _sought(variable: str, kind: str, conditions: Sequence[Condition], negated: 
     others = " and ".join(words(c.right if c.left == variable else c.left) for c in but)
     whole = f"{which} {kind}{f' but {others}' if but else ''}"
     mark = next(f"⟨{depth}⟩" for depth in count() if f"⟨{depth}⟩" not in f"{conditions}")  # stands for the individual
-    clauses = [said(substituted(c, {variable: mark}), words) for c in asked]
+    clauses = [said(substituted(c, {variable: mark}), words, (*outer, named)) for c in asked]
     if not clauses:
         return f"there is {whole}"
     if which != "every":  # clauses with the individual as the subject come last
@@ -122,7 +130,10 @@ def _sought(variable: str, kind: str, conditions: Sequence[Condition], negated: 
         return " ".join(
             (whole, *([" and ".join(filter(None, relative))] if before else []), last.removeprefix(f"{mark} "))
         )
-    it = f"the {kind.partition(' of ')[0]}"
+    it, before_it = kind.partition(" of ")[0], outer.count(named)
+    alike = any(isinstance(part, Witness) and part.kind == named for c in conditions for part in walk(c))
+    number = ORDINALS[before_it] if before_it < len(ORDINALS) else f"{before_it + 1}th"
+    it = f"the {number} {it}" if before_it or alike else f"the {it}"
     such = " and ".join(clause.replace(mark, it) for clause in (before if which == "every" else clauses))
     if which == "every":
         return f"for {whole}{f' such that {such}' if such else ''}, {last.replace(mark, it)}"

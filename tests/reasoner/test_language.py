@@ -6,6 +6,7 @@ import pytest
 
 from confab.reasoner.amounts import Amount, Calculation, Measure
 from confab.reasoner.language import groups, is_variable, measures, mentions, needs, nothing_determines, terms, walk
+from confab.reasoner.sentences import said
 from confab.reasoner.symbols import (
     AmountEffect,
     AnyOf,
@@ -77,3 +78,13 @@ def test_numeric_relations_are_found_in_all_parts_of_behaviours() -> None:
 def test_variables_that_no_condition_determines_are_named() -> None:
     error = nothing_determines("B1_MOVE", [NOT_AT, SAME, AT], {"?c", "?room"})
     assert str(error) == "B1_MOVE: nothing determines ?d, ?p; add a value condition that does"
+
+
+def test_different_individuals_of_one_class_have_different_names_in_a_sentence() -> None:
+    def viability(packet: str) -> Measure:
+        return Measure("viability", (packet,))
+
+    poorer = Witness("?q", "Packet", (Comparison(viability("?q"), "<", viability("?p")),), negated=True)
+    wanted = Witness("?p", "Packet", (has("IN", "?p", "vault"), poorer))
+    better = "no Packet viability < the first Packet viability and the first Packet IN vault"
+    assert said(wanted) == f"there is some Packet such that {better}"
