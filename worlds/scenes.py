@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
@@ -101,7 +102,7 @@ class _Scene:
         self.world, self.problem = world, world.problem
         self.situations = world.problem.domain.situations
         self.nodes: list[str] = []
-        self.written: list[Behavior] = []  # behaviours written as updates
+        self.written: list[tuple[Behavior, str]] = []  # behaviours written as updates, and the updates
         self.terms: dict[str, str] = {}
         self.where, self.count = "", 0
         self.rng, self.queries = Random(f"goals {world.seed}"), Random(f"queries {world.seed}")
@@ -259,11 +260,13 @@ class _Scene:
         one = self.with_own(replace(one, parameters=parameters, preconditions=conditions))
         if one.name in self.world.updates and one.price is None and (text := self.as_update(one)) is not None:
             said = [f'c:update """{text}"""']
-            for other in self.written if self.world.extending else ():
-                if (more := without(one, other)) is not None and (text := self.as_update(more)) is not None:
-                    said = [f"c:extends :{other.name}", f'c:update """{text}"""']
+            for other, its in self.written if self.world.extending else ():
+                more = without(one, other)
+                added = None if more is None else self.as_update(more)
+                if added is not None and self.numbers(added).isdisjoint(self.numbers(its)):
+                    said = [f"c:extends :{other.name}", f'c:update """{added}"""']
                     break
-            self.written.append(one)
+            self.written.append((one, text))
             yield self.node(one.name, "owl:NamedIndividual, c:Behavior", *head, *said)
             return
         self.begin(one.name, [p.name for p in (*one.parameters, *one.variables)])
@@ -289,6 +292,11 @@ class _Scene:
         yield self.node(one.name, "owl:NamedIndividual, c:Behavior", *head, f"c:postcondition {', '.join(effects)}")
         yield from self.declared(one)
         yield from self.nodes
+
+    def numbers(self, text: str) -> set[str]:
+        """Return the variables of an update that stand for numbers; two updates that are joined share variables of one name."""
+        stems = ["after", *(name.lower() for name, its in self.situations.items() if its.quantity is not None)]
+        return set(re.findall(rf"\?(?:{'|'.join(stems)})\w*", text))
 
     def as_update(self, one: Behavior) -> str | None:
         """Return a behaviour as a SPARQL update, or None if an update can't express the behaviour."""
