@@ -173,6 +173,8 @@ def plan_task(task: PlanningTask) -> Found:
         problem, part = task.whole(), None
         faulty = [*never_done(problem)]
     if needs_others_meanwhile(problem):
+        if task.options.by_engine:
+            raise KnowledgeError("the steps of this task must overlap, which engines don't plan; leave out the engine")
         if problem.weights:
             raise KnowledgeError("a task whose steps must overlap can't have soft goals; drop the :weight of its goals")
         problem = task.with_measured_durations(problem if task.reading.whole else task.whole())

@@ -64,8 +64,10 @@ class PlanOptions:
                 "a level is chosen for an engine; name one, e.g. engine='fast-downward' "
                 "(plan.at_level(LEVEL) has the steps of a level)"
             )
-        if self.by_engine and (self.mode == "paper" or self.asks_for_least):
-            raise KnowledgeError("an engine plans by itself; leave out optimal=True and mode='paper'")
+        if self.by_engine and self.strategy in ("paper", "optimal"):
+            raise KnowledgeError(
+                "an engine plans by itself; leave out optimal=True and the modes 'optimal' and 'paper'"
+            )
         if self.by_engine and not self.leave_levels:
             raise KnowledgeError(
                 "an engine plans one level alone, so it may leave the others; leave out leave_levels=False"

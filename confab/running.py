@@ -140,10 +140,10 @@ def persuaded(scene: Scene, result: Result, job: Job, plan: Callable[[Scene], Re
     """Verify a plan in physics. If the verification refutes the plan, plan and verify again.
 
     Return the scene with all refutations, the last result of planning, and the report of its verification. Refutations are
-    saved if the next plan differs from the refuted plan.
+    saved if the next plan differs from the refuted plan. With perturbed perception, a failure refutes nothing.
     """
     report = verified(scene, result, job)
-    while refuted := refuted_in(scene, report):
+    while not job.noise and (refuted := refuted_in(scene, report)):
         known = knowing(scene, refuted)
         announce(f"refuted: {refuted[-1]}; planning again")
         another = plan(known)

@@ -28,11 +28,13 @@ from confab.planner.behavior_tree import (
 from confab.planner.behavior_tree import behavior_tree as tree_of
 from confab.planner.plan import Plan, Step
 from confab.reasoner.files import check_replaceable, made_folder, write_whole
+from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.kinds import TREE, stamped
 from confab.reasoner.limits import check
 from confab.reasoner.problem import Problem
 from confab.reasoner.sentences import said
 from confab.reasoner.symbols import Condition, Fact
+from confab.timing import needs_others_meanwhile
 
 RETRIES = 5
 """An exported tree fails after this number of failures; after each earlier failure, it starts again."""
@@ -92,6 +94,8 @@ class Tree:
 
 def behavior_tree(problem: Problem, plan: Plan) -> Tree:
     """Return the behaviour tree of a valid plan, with nodes that both BehaviorTree.CPP and py_trees support."""
+    if needs_others_meanwhile(problem):
+        raise KnowledgeError("steps of this plan must overlap; a behaviour tree executes one step after another")
     lowering = _ElementWriter(problem)
     first, then = (lowering.lowered(tree).name for tree in tree_of(problem, plan))
     return Tree(first, then, lowering.subtrees, lowering.leaves)

@@ -227,9 +227,11 @@ class SymbolicWorld:
         }
         kinds = shared_kinds(self.problem, [value for value in values if value not in special])
         found = Discovery(name, kinds, relations, text=f"{individual} stands beside {there}: {name}")
-        self.problem = met(self.problem, found)
+        problem = met(self.problem, found)
+        after = following(problem, {**self.state, symbol: name})
+        refuse_impossible(problem, self.state, after, f"{individual} can't be pushed")
+        self.problem, self.state = problem, after
         self._news.append(found)
-        self.state[symbol] = name
 
 
 def _interrupted(step: Step) -> WorldReport:

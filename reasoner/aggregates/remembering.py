@@ -93,7 +93,7 @@ def remembering(behavior: Behavior, count: Aggregate, domain: Domain, classes: M
     Raises
     ------
     DomainError
-        The behaviour has a duration.
+        The behaviour has a duration or an actor.
     TooManyCasesError
         Too many effects of the behaviour change the same remembered situation type.
     """
@@ -101,8 +101,8 @@ def remembering(behavior: Behavior, count: Aggregate, domain: Domain, classes: M
         return behavior
     if behavior.timing is not None:
         raise DomainError(
-            f"{behavior.name} has a duration and changes what {stated(count.situation, domain)} remembers; leave the duration "
-            "out, or the condition about earlier states (c:remembers, c:atMostOnce, c:onlyAfter)"
+            f"{behavior.name} has a duration or an actor, and changes what {stated(count.situation, domain)} remembers; leave out "
+            "the duration and the actor, or the condition about earlier states (c:remembers, c:atMostOnce, c:onlyAfter)"
         )
     situations = {
         **domain.situations,

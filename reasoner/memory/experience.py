@@ -305,9 +305,10 @@ class Experience:
     def merge(self, other: Experience) -> None:
         """Merge another memory into this one: of two copies of a tally or a statistic, the greater one is kept.
 
-        Merges can be repeated, and made in any order.
+        What either memory disables is disabled. Merges can be repeated, and made in any order.
         """
         self.said.update(other.said)
+        self.disabled |= other.disabled
         for replica, number in other.episodes.items():
             self.episodes[replica] = max(self.episodes.get(replica, 0), number)
         for who, name, fact, tally in other:

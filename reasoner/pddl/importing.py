@@ -11,7 +11,7 @@ any other predicate             boolean situation type
 derived predicate               boolean situation type with rules
 ``sometime``, ``at-most-once``  remembered situation types, with a goal or a constraint
 action                          behaviour on level 1, all of whose variables are parameters
-cost that depends on objects    one behaviour per cost
+cost that depends on objects    price of the behaviour
 function that never changes     static relation, whose last argument is the number
 any other function              situation type whose values are amounts, unless it only counts cost
 (soft) goal that isn't a fact   boolean situation type ``GOAL_REACHED`` with a rule

@@ -226,7 +226,7 @@ class Definitions:
         if iri in self.recursive - self.concluded.keys():
             raise KnowledgeError(
                 f"{local_name(iri)} is defined by itself; define a situation type with c:holdsOf {local_name(iri)}, which may be "
-                "recursive, or remove {local_name(iri)} from its own definition",
+                f"recursive, or remove {local_name(iri)} from its own definition",
                 iri,
             )
         if iri in self.concluded:

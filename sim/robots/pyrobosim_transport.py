@@ -44,7 +44,7 @@ class Pyrobosim:
         try:
             from pyrobosim.core.yaml_utils import WorldYamlLoader
         except ImportError as error:
-            raise RobotError(f"pyrobosim isn't installed ({error}); pip install 'confab[pyrobosim]'") from error
+            raise RobotError(f"pyrobosim isn't installed ({error}); pip install 'confab-planner[pyrobosim]'") from error
         random.seed(seed)
         np.random.seed(seed % 2**32)
         before = logging.root.manager.disable

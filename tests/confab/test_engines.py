@@ -133,6 +133,7 @@ def test_without_a_time_limit_an_engine_runs_after_bounded_work_and_own_search_c
     [
         (["--level", "2"], "a level is chosen for an engine"),
         (["--engine", "e", "--optimal"], "an engine plans by itself"),
+        (["--engine", "e", "--mode", "optimal"], "an engine plans by itself"),
         (["--engine", "e", "--levels", "strict"], "an engine plans one level alone"),
     ],
 )

@@ -23,6 +23,7 @@ from confab.planner.validation import successor, validate
 from confab.reasoner.generate import write_scene
 from confab.reasoner.graph.knowledge import load
 from confab.reasoner.memory.links import Links
+from confab.reasoner.possible import ImpossibleStateError
 from confab.reasoner.reading.problem import read
 from confab.reasoner.symbols import FALSE, Fact, State, Symbol
 from tests.planner.serving import planned, serving
@@ -460,6 +461,11 @@ def test_an_object_that_is_pushed_off_its_place_is_at_a_spot_and_is_brought_back
         seen.value == "spot1" for seen in episode.course
     )
     assert episode.observed[Symbol("LOCATION", ("cup2",))] == "location5"
+
+
+def test_an_object_in_a_hand_cannot_be_pushed() -> None:
+    with pytest.raises(ImpossibleStateError, match="can't be pushed"):
+        acted(Intervention(InterventionKind.PUSH, individual="cup1", numbers=(0.0, 0.08), at=3.5))
 
 
 def test_an_unknown_box_at_a_goal_place_is_moved_away() -> None:

@@ -19,6 +19,7 @@ from confab.reasoner.pddl.turtle import turtle
 from confab.reasoner.pddl.words import PddlError
 from confab.reasoner.symbols import Span
 from confab.reasoner.timing import only_during
+from confab.trees import behavior_tree
 
 EPSILON = Fraction(1, 1000)
 CELLAR = """(define (domain cellar) (:requirements :typing :durative-actions) (:types match fuse)
@@ -195,6 +196,11 @@ def test_a_scene_with_time_is_planned_with_its_schedule(tmp_path: Path) -> None:
     assert result.timed is not None
     assert result.json()["schedule"]["makespan"] == float(result.timed.makespan)
     assert "makespan" in str(result)
+    assert "STRIKE" in result._repr_html_()
+    with pytest.raises(KnowledgeError, match="must overlap"):
+        behavior_tree(result.problem, result.plan)
+    with pytest.raises(KnowledgeError, match="must overlap"):
+        confab.load(str(path)).plan(engine="tamer")
 
 
 @pytest.mark.parametrize(

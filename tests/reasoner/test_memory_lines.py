@@ -179,9 +179,9 @@ def test_a_memory_names_its_learner_its_trusted_sources_and_its_numbers_of_episo
         experience.learn(Lesson([rule()], [(rule(), ("cup is", "full"), Tally(1))]))
     other = Experience("friend")
     other.learn(Lesson([], [(GoalKind("AT", ("Cup",)), ITSELF, Tally(passed_over=2))]))
+    other.disabled.add(rule().name)  # what either memory disables is disabled
     experience.merge(other)
     experience.trusts.add("friend")
-    experience.disabled.add(rule().name)
     save(tmp_path / "m.ttl", experience, NAMES, DOMAIN)
     found = load(tmp_path / "m.ttl", NAMES)
     assert found == experience
