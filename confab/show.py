@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from confab.planner.plan import Outcome, Plan, Step
+from confab.planner.plan import Left, Outcome, Plan, Step
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions
@@ -169,10 +169,23 @@ def summary(outcome: Outcome) -> str:
         effort += f", refinements {outcome.hits} from the cache and {outcome.misses} searched"
     if outcome.seconds:  # a plan from a file wasn't searched
         effort += f", {outcome.seconds * 1000:.0f} ms of search"
-    breaks = [broken.text for left in outcome.left for broken in left.broken]
     by = f" by {outcome.engine}" if outcome.engine else ""
     lines = [f"solved{by}: {lengths(outcome.plan)} steps{on}{effort}{bound}"]
     lines += unmet
-    lines += outcome.given_up
-    lines += [f"the plan violates a condition of the level above: {text}" for text in breaks]
+    lines += remarks_on_levels(outcome)
     return "\n".join(lines)
+
+
+def remarks_on_levels(outcome: Outcome) -> list[str]:
+    """Return the reasons why levels were given up, or else the steps that replace steps of a level, and the violated conditions."""
+    replaced = [f"{_steps(one)} of level {one.level}" for one in outcome.left]
+    broken = [
+        f"the plan violates a condition of the level above: {one.text}" for left in outcome.left for one in left.broken
+    ]
+    return [*(outcome.given_up or replaced), *broken]
+
+
+def _steps(left: Left) -> str:
+    """Return the text that lower-level steps replace steps; positions are those that ``confab explain`` takes."""
+    first, last = (".".join(map(str, path)) for path in (left.first, left.last))
+    return f"step {first} replaces steps" if first == last else f"steps {first} to {last} replace steps"

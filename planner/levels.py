@@ -20,7 +20,7 @@ from confab.planner.validation import BehaviorReader, Cell, LoggedState, stretch
 from confab.reasoner.language import is_variable, mentions, substituted
 from confab.reasoner.problem import Problem
 from confab.reasoner.sentences import said
-from confab.reasoner.symbols import AmountEffect, Behavior, Condition, Fact, Symbol, ValueCondition, ValueEffect
+from confab.reasoner.symbols import AmountEffect, Behavior, Condition, Fact, Symbol, Times, ValueCondition, ValueEffect
 
 MOST_LACKING = 4
 """Maximum number of conditions that are removed together to find the failing conditions of a behaviour."""
@@ -37,6 +37,7 @@ class _Watch:
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.rules = BehaviorReader(problem)
+        self.events = (problem.times or Times()).events
         self.facts = LoggedState(problem, problem.initial)
         self.views = {
             level: LoggedState(
@@ -52,7 +53,10 @@ class _Watch:
     def carried_out(self, steps: Sequence[Step], above: int) -> Iterator[Left]:
         level = next((level for level in self.problem.domain.levels if level > above), above)
         for part in stretches(steps, level):
-            if part[0].level > level:
+            if all(step.behavior in self.events for step in part):  # an external event takes the place of no step
+                for step in part:
+                    self.step(step)
+            elif part[0].level > level:
                 self.left[level], self.history[level] = [], []
                 yield from self.carried_out(part, level)
                 yield Left(level, part[0].path, part[-1].path, tuple(self.broken(level)))

@@ -17,7 +17,6 @@ from confab.page.results import (
     film_of,
     goals_of,
     mark_of,
-    small_print_of,
     status_of,
     tiles_of,
 )
@@ -65,7 +64,7 @@ def page_data(
     again : str, optional
         The command that repeats the run; by default, a command that fits the other arguments.
     """
-    from confab.show import summary
+    from confab.show import remarks_on_levels, summary
 
     problem = result.problem if result is not None else scene.problem
     labels = page_labels(scene, problem)
@@ -89,7 +88,7 @@ def page_data(
         "goals": goals_of(timeline, labels, planned),
         "notes": [
             *data["notes"],
-            *small_print_of(outcome),
+            *(remarks_on_levels(outcome) if outcome is not None else ()),
             *filter(None, [result.dearer() if result is not None else ""]),
         ],
         "again": again or again_of(scene, problem, report, execution, timeline.unit == "s"),

@@ -244,11 +244,3 @@ def again_of(
     first = scene.problem.goal
     goals = [str(Fact(symbol, value)) for symbol, value in sorted(problem.goal.items()) if first.get(symbol) != value]
     return join(["confab", "plan", *changed, *(f"--goal={goal}" for goal in goals)])
-
-
-def small_print_of(outcome: Outcome | None) -> list[str]:
-    """Return notes on the levels on which no plan can be refined, and on the violated conditions of these levels."""
-    if outcome is None:
-        return []
-    broken = [broken.text for left in outcome.left for broken in left.broken]
-    return [*outcome.given_up, *(f"the plan violates a condition of the level above: {text}" for text in broken)]

@@ -1,14 +1,17 @@
 """A scene in a notebook: its tables, its plan and its memory."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import confab
 from confab.interchange import read_plan
+from confab.planner.plan import Left
 from confab.planner.solve import Mode
 from confab.scene import described
+from confab.show import summary
 
 GUESTS = Path(__file__).parent / "cases" / "guests.ttl"
 
@@ -116,3 +119,11 @@ def test_the_shipped_scenes_are_listed_with_their_levels_and_individuals() -> No
     assert rows.keys() == set(confab.scenes())
     assert rows["beverage-serving"][1:4] == ("3", "13", "physics")
     assert rows["towers-small"]["verified by"] == "symbols only"
+
+
+def test_a_plan_says_which_steps_replace_steps_of_a_level() -> None:
+    outcome = confab.load("beverage-serving").plan().outcome
+    assert len(summary(outcome).splitlines()) == 1
+    said = summary(replace(outcome, left=(Left(1, (0,), (7,), ()), Left(2, (8, 1), (8, 1), ()))))
+    assert said.splitlines()[1:] == ["steps 0 to 7 replace steps of level 1", "step 8.1 replaces steps of level 2"]
+    assert summary(replace(outcome, left=(Left(1, (0,), (7,), ()),), given_up=("why",))).splitlines()[1:] == ["why"]

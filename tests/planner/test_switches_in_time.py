@@ -72,6 +72,7 @@ def test_an_event_that_changes_nothing_is_a_step_of_the_plan_above_any_level(tmp
     assert [step.behavior for step in result.plan.primitives] == ["WORK", "OPEN"]
     assert [step.behavior for step in result.plan.steps] == ["BEGIN", "OPEN"]
     assert "undo each other" not in result.dearer()
+    assert not result.outcome.left
 
 
 @pytest.mark.parametrize("proved", [False, True])
