@@ -335,12 +335,12 @@ class Result(metaclass=RightNames):
         """The causal links of each step, by the step's path (`confab.planner.causal_links`)."""
         from confab.planner.causal_links import purposes
 
-        if not self.in_sequence:
+        if not self._in_sequence:
             raise KnowledgeError("steps of this plan must overlap; reasons are given for sequences of steps only")
         return purposes(self.problem, self.plan)
 
     @property
-    def in_sequence(self) -> bool:
+    def _in_sequence(self) -> bool:
         """Whether the steps can be executed one after another; otherwise some steps must overlap."""
         return schedule_of(self.outcome) is None and not needs_others_meanwhile(self.problem)
 
@@ -582,6 +582,6 @@ class Result(metaclass=RightNames):
         headline = tag("p", summary(self.outcome))
         if self.outcome.plan is None:
             return styled(headline)
-        short = self.in_sequence and sum(1 for _ in self.plan.walk()) <= MOST_STEPS
+        short = self._in_sequence and sum(1 for _ in self.plan.walk()) <= MOST_STEPS
         needed = self.purposes if short else None
         return styled(headline, tree(self.plan, self.labels, None, needed))
