@@ -68,20 +68,22 @@ class UpdateCompiler:
         self.conditions = Conditions(self.nodes, self.scope, self.numbers)
         self.known: set[str] = set()
 
-    def write(self, update: Update) -> None:
+    def write(self, update: Update, declared: Collection[str] = ()) -> None:
         """Compile an update.
 
-        The first operation of an update states preconditions and effects; further operations state conditional effects.
+        The first operation of an update states preconditions and effects; further operations state conditional effects. The
+        parameters that the update names or `declared` names come after those of the updates compiled before.
         """
         own, operations = parsed(update.text)
         self.nodes.now, self.scope.prefixes = update, {**update.prefixes, **own}
-        for name, (node, kind, number) in self.scope.declared.items():
-            if number and name not in self.scope.terms:
-                self.scope.bind(name, kind, "Parameter", node, update.place(0))
         first = operations[0]
-        known = self.known | {name for name, (_, _, number) in self.scope.declared.items() if number}
         later = [(one.delete, one.insert, one.where) for one in operations[1:]]
         used = set(words([first.delete, first.insert, *later]))
+        named = {*declared, *used, *words(first.where)}
+        for name, (node, kind, number) in self.scope.declared.items():
+            if number and name in named and name not in self.scope.terms:
+                self.scope.bind(name, kind, "Parameter", node, update.place(0))
+        known = self.known | {name for name, (*_, number) in self.scope.declared.items() if number and name in named}
         group = self.scope.group(first.where, known, used)
         for name, kind in group.chosen.items():
             self.scope.bind(name, self.scope.iri(kind), "Parameter", "", update.place(kind.at))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import pyoxigraph as ox
 
 from confab.reasoner.closure import closure
+from confab.reasoner.limits import check
 from confab.reasoner.names import local_name
 from confab.reasoner.updates.behaviors import UpdateCompiler
 from confab.reasoner.updates.texts import Ask, TextPosition, Update, Vocabulary
@@ -90,6 +91,7 @@ def compiled(ask: Ask, spelled: Mapping[str, Mapping[str, str]], prefixes: Mappi
         number = int(index.value) if index is not None and index.value.isdigit() else 0
         declared.setdefault(behavior.value, {})[name] = node.value, kind.value, number
     for rule in sorted(rules):
+        check("compiling rules")
         compiler = UpdateCompiler(rule, vocabulary, {})
         try:
             compiler.write_rule(updates.pop(rule))
@@ -100,6 +102,7 @@ def compiled(ask: Ask, spelled: Mapping[str, Mapping[str, str]], prefixes: Mappi
         done.triples += compiler.nodes.triples()
         done.places |= {node: replace(place, form="rule") for node, place in compiler.nodes.places.items()}
     for behavior in sorted({*updates, *extends}):
+        check("compiling updates")
         _compile(behavior, updates, extends, declared, vocabulary, done)
     return done
 
@@ -125,9 +128,9 @@ def _compile(
         return
     terms = {name: ("", *known[1:]) for source in sources for name, known in declared.get(source, {}).items()}
     compiler = UpdateCompiler(behavior, vocabulary, {**terms, **declared.get(behavior, {})})
-    for update in (updates[source] for source in sources if source in updates):
+    for source, update in ((source, updates[source]) for source in sources if source in updates):
         try:
-            compiler.write(update)
+            compiler.write(update, declared.get(source, ()))
         except UpdateError as error:
             done.faults.append(UpdateFault(update.place(error.at), error.what, error.remedy))
             return

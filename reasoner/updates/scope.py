@@ -65,6 +65,7 @@ class VariableScope:
         whose value the variable of a nested group denotes.
     prefixes : mapping of prefix to namespace
     numbers : mapping of variable to the triple or expression that gives its number
+    several : mapping of variable to a relation, or a property of pairs, whose value it is; such a value determines no variable
     """
 
     nodes: Nodes
@@ -74,6 +75,7 @@ class VariableScope:
     kinds: dict[str, tuple[str, str, Hashable]] = field(default_factory=dict)
     prefixes: dict[str, str] = field(default_factory=dict)
     numbers: dict[str, Any] = field(default_factory=dict)
+    several: dict[str, Word] = field(default_factory=dict)
 
     def bind(
         self, name: str, kind: str, role: str, node: str, place: TextPosition, binder: Hashable = "behavior"
@@ -140,9 +142,13 @@ class VariableScope:
             raise UpdateError(f"{said} is a number in the place of an individual", "name an individual", said.at)
         if said not in known:
             local = f" here; another {said} is local to its braces" if said in self.terms else ""
+            several = self.several.get(said)
             raise UpdateError(
-                f"nothing determines the variable {said}{local}",
-                f"state its type ({said} a …), or add a situation with {said} as its value (?x :property {said})",
+                f"nothing determines the variable {said}{local}"
+                + (f", since {several} may have several values" if several else ""),
+                f"state its type ({said} a …), or add a situation with "
+                + (f"one value at a time and with {said} as" if several else f"{said} as")
+                + f" its value (?x :property {said})",
                 said.at,
             )
         return self.terms[said]
@@ -218,6 +224,8 @@ class VariableScope:
                 group.determined[last] = self.vocabulary.properties[prop], last.at, one
             elif prop in self.vocabulary.bare:
                 group.determined[last] = prop, last.at, one
+            elif prop in self.vocabulary.properties or prop in self.vocabulary.relations:
+                self.several.setdefault(last, one.predicate)
         return False
 
 

@@ -153,6 +153,12 @@ def faults(folder: Path, text: str) -> list[UpdateFault]:
         (HEAD + "}\nFILTER (?a)", "'FILTER' isn't expected here", "write DELETE", (2, 1)),
         (HEAD + ".\n ?a :fits ?slot }", "nothing determines the variable ?a", "state its type", (2, 2)),
         (
+            HEAD + ".\n ?slot :fits ?a }",
+            "nothing determines the variable ?a, since :fits may have several values",
+            "a situation with one value at a time and with ?a as its value",
+            (2, 14),
+        ),
+        (
             HEAD + ".\n FILTER EXISTS { ?a a :Slot . ?tube :fits ?a } ?a :fits ?slot }",
             "nothing determines the variable ?a here; another ?a is local to its braces",
             "state its type",
@@ -266,6 +272,20 @@ def test_a_behaviour_can_extend_a_behaviour_of_another_level(tmp_path: Path) -> 
     (tmp_path / "small.ttl").write_text(text.replace("c:update", "c:extends :LOW ; c:update") + more)
     with pytest.raises(KnowledgeError, match="extends itself"):
         load(tmp_path / "small.ttl")
+
+
+def test_the_parameters_of_an_extended_behaviour_come_before_a_declared_one(tmp_path: Path) -> None:
+    faults(tmp_path, f"{HEAD}}}")
+    with (tmp_path / "small.ttl").open("a") as file:
+        file.write(
+            ":LOW a owl:NamedIndividual, c:Behavior ; c:level 2 ; c:index 1 ; c:extends :MOVE ; c:parameter :LOW.alpha ; "
+            'c:update "INSERT {} WHERE { ?alpha :fits ?slot }" .\n'
+            ":LOW.alpha a owl:NamedIndividual, c:Parameter ; c:index 3 ; c:termType :Tube .\n"
+        )
+    low, move = sorted(behaviors(load(tmp_path / "small.ttl")).values(), key=lambda behavior: behavior.name)
+    assert [p.name for p in low.parameters] == [*(p.name for p in move.parameters), "?alpha"]
+    (own,) = set(low.preconditions) - set(move.preconditions)
+    assert "?alpha" in str(own)
 
 
 def test_a_behaviour_can_extend_two_behaviours_that_extend_the_same_behaviour(tmp_path: Path) -> None:
