@@ -331,7 +331,7 @@ def choose_and_search(task: PlanningTask, problem: Problem) -> tuple[Problem, Ou
 
     def shorten(choice: Problem, found: Outcome, briefly: bool) -> Outcome:
         how = comparing(choice)._replace(shortening="brief") if briefly else Searching(mode)
-        return counted(search(task, choice, how._replace(first=found)))
+        return in_its_times(choice, counted(search(task, choice, how._replace(first=found))))
 
     def extended(choice: Problem, found: Outcome) -> Outcome:
         how = bounded._replace(first=found)

@@ -35,6 +35,8 @@ from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import Times
 from confab.reasoner.timing import judged_by_events
 
+MOST_PLACES = 50
+"""Maximum number of steps before which an external event that a plan doesn't need is tried, after the first place."""
 KEPT = 0.25
 """The share of the remaining time that sharing the goals among actors leaves for scheduling the resulting steps."""
 
@@ -211,7 +213,8 @@ def in_time(
                 if not faults:
                     return Timed(timed)
                 if events is None and (missing := omitted(problem, timed)):
-                    complete = in_time(problem, _with_events(problem, timed, missing), left(), separation)
+                    whole = _with_events(problem, timed, missing, separation)
+                    complete = Timed() if whole is None else in_time(problem, whole, left(), separation)
                     if complete.plan is not None:
                         return complete
         if not choices.of and until:
@@ -224,15 +227,31 @@ def in_time(
         choices = replace(choices, of={turn: able for turn, able in choices.of.items() if moved and turn not in moved})
 
 
-def _with_events(problem: Problem, timed: TimedPlan, missing: Mapping[str, Fraction]) -> Plan:
-    """Return the plan with missing external events, each after all steps of the plan that begin before the event."""
-    begin = {slot.step.path: slot.begin for slot in timed.slots}
-    steps = list(timed.plan.steps)
+def _with_events(
+    problem: Problem, timed: TimedPlan, missing: Mapping[str, Fraction], separation: Fraction
+) -> Plan | None:
+    """Return the plan with missing external events, or None if no place of an event has a schedule.
+
+    Each event follows all steps of the plan that begin before the event. If the steps have no schedule then, the last of these
+    steps wait for the event: as few as possible, and at most `MOST_PLACES`. An event without such a place comes immediately before
+    the next event.
+    """
+    times, now, waiting = problem.times or Times(), timed, list[Step]()
+    happening = {step.behavior for step in now.plan.walk()}
     for name, at in missing.items():
-        before = (i for i, step in enumerate(steps, 1) if any(begin.get(s.path, at) < at for s in step.walk()))
-        event = Step((), problem.id_of(name, ()), problem.domain.behaviors[name].level, name, ())
-        steps.insert(max(before, default=0), event)
-    return replace(timed.plan, steps=renumbered(steps))
+        happening.add(name)
+        waiting.append(Step((), problem.id_of(name, ()), problem.domain.behaviors[name].level, name, ()))
+        asked = replace(problem, times=replace(times, events={n: t for n, t in times.events.items() if n in happening}))
+        begin, steps = {slot.step.path: slot.begin for slot in now.slots}, now.plan.steps
+        begun = (i for i, step in enumerate(steps, 1) if any(begin.get(one.path, at) < at for one in step.walk()))
+        last = max(begun, default=0)
+        for place in range(last, max(last - MOST_PLACES, 0) - 1, -1):
+            plan = replace(now.plan, steps=renumbered((*steps[:place], *waiting, *steps[place:])))
+            found = in_time(asked, plan, 0.0, separation)
+            if found.plan is not None:
+                now, waiting = found.plan, []
+                break
+    return None if waiting else now.plan
 
 
 def _late(

@@ -75,6 +75,43 @@ def test_an_event_that_changes_nothing_is_a_step_of_the_plan_above_any_level(tmp
     assert not result.outcome.left
 
 
+def happening(name: str, seconds: int, effect: str, about: str, more: str = "") -> str:
+    """Return an external event without duration that turns a switch on, or off with `more`."""
+    said = f" ; c:level 1 ; c:index {seconds + 2} ; c:postcondition :{effect}{lasts(0)}{lasts(seconds, 'happensAt')}"
+    return node(name, "Behavior", "", said) + node(effect, "ValueEffect", about, more)
+
+
+OFF = " ; c:negated true"
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "order", "makespan"),
+    [
+        (("b2", ""), ("b2", OFF), ["WORK", "E2", "E4"], 10),  # neither matters to the step
+        (("b", OFF), ("b2", ""), ["E2", "WORK", "E4"], 12),  # the step waits for the first event
+        (("a", OFF), ("a", ""), ["E2", "E4", "WORK"], 14),  # the step waits until the second event undoes the first
+    ],
+)
+def test_the_steps_of_a_plan_wait_for_external_events_that_it_needs_not(
+    first: tuple[str, str], second: tuple[str, str], order: list[str], makespan: int, tmp_path: Path
+) -> None:
+    events = happening("E2", 2, "two", *first), happening("E4", 4, "four", *second)
+    timed = load(tmp_path, WORK, *events, DONE).plan().timed
+    assert timed is not None
+    assert [slot.step.behavior for slot in timed.slots] == order
+    assert timed.makespan == makespan
+
+
+def test_a_soft_goal_that_an_external_event_undoes_is_unmet(tmp_path: Path) -> None:
+    goals = node("task", "Task", "", " ; c:goal :done, :soft") + node("done", "ValueCondition", "b")
+    soft = node("soft", "ValueCondition", "a2", " ; c:weight 3") + HEAD.splitlines()[-1].replace(":a.", ":a2.").replace(
+        ":a ;", ":a2 ;"
+    )
+    outcome = load(tmp_path, WORK, happening("E5", 5, "five", "a2", OFF), goals, soft).plan().outcome
+    assert outcome.status is Status.SOLVED
+    assert [str(one.fact) for one in outcome.forgone] == ["a2 ON true"]
+
+
 @pytest.mark.parametrize("proved", [False, True])
 @pytest.mark.parametrize(("wanted", "status"), [(1, Status.SOLVED), (2, Status.GAVE_UP)])
 def test_an_external_event_happens_only_once(wanted: int, status: Status, proved: bool, tmp_path: Path) -> None:
