@@ -8,7 +8,7 @@ condition must hold and when each effect takes place.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from itertools import product
@@ -22,10 +22,11 @@ from confab.reasoner.amounts import (
     after_effect,
     inside,
     situations_in,
+    terms_of,
     with_amounts,
 )
 from confab.reasoner.effects import made_of
-from confab.reasoner.language import DomainError, plain_variables, terms, walk
+from confab.reasoner.language import DomainError, is_variable, plain_variables, situations_of, terms, walk
 from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     FALSE,
@@ -69,7 +70,9 @@ def with_fixed(behavior: Behavior) -> Behavior:
 
 
 def projected(
-    conditions: Sequence[tuple[Span, Condition]], effects: Sequence[tuple[Span, Effect]]
+    conditions: Sequence[tuple[Span, Condition]],
+    effects: Sequence[tuple[Span, Effect]],
+    given: Callable[[Span, Condition, Effect], tuple[Condition, ...]] | None = None,
 ) -> tuple[tuple[Condition, ...], tuple[Effect, ...]]:
     """Return the preconditions and effects of a behaviour that no other step overlaps.
 
@@ -77,6 +80,7 @@ def projected(
     condition on amounts that earlier effects change becomes a condition on the amounts before the behaviour, and so do the
     calculations and conditions of effects. An effect that a later effect overwrites is omitted. Increases, decreases and factors
     overwrite nothing, and equal ones add up; if an amount is increased or decreased before it is scaled, it is assigned the result.
+    `given` returns what a condition of an effect requires before the behaviour if this function leaves the condition as it is.
     """
     spans = tuple(Span)
 
@@ -101,6 +105,10 @@ def projected(
             return (condition,) if decided is None else () if decided else (condition, NEVER)
         return _compared_before(condition, amounts[span]) if isinstance(condition, Comparison) else (condition,)
 
+    def required(span: Span, condition: Condition, effect: Effect) -> tuple[Condition, ...]:
+        found = before(span, condition)
+        return found if given is None or found != (condition,) else given(span, condition, effect)
+
     changes = [(spans.index(at), e) for at, e in effects if isinstance(e, AmountEffect) and not e.when and not e.each]
     mixed = {
         Amount(one.situation, one.arguments): None
@@ -111,7 +119,7 @@ def projected(
     asked = dict.fromkeys(one for span, condition in conditions for one in before(span, condition))
     found = list[Effect]()
     for span, effect in effects:
-        when = tuple(one for condition in effect.when for one in before(span, condition))
+        when = tuple(one for condition in effect.when for one in required(span, condition, effect))
         cell = Amount(effect.situation, effect.arguments)
         if overwritten(span, effect) or (cell in mixed and not effect.when and not effect.each):
             continue
@@ -172,58 +180,93 @@ def given_itself(
 ) -> tuple[Condition, ...]:
     """Return conditions of a durative behaviour before its own effects in earlier spans, beginning with the span `since`.
 
-    In contrast to `projected`, the conditions may have alternatives, witnesses or totals. Only conditions of this kind with one
-    of the spans are changed.
+    In contrast to `projected`, the conditions may have alternatives, witnesses or totals, and the effects may have conditions.
     """
     found = list[Condition]()
     for condition in conditions:
         its = [span for span, one in timing_of(behavior).conditions if one == condition and span in spans]
-        priced = condition in (behavior.priced, behavior.lasting)
-        if its and isinstance(condition, AnyOf | Witness | Comparison) and not priced:
-            for span in its:
-                found += _given(
-                    condition,
-                    tuple(Span)[tuple(Span).index(since) : tuple(Span).index(span)],
-                    behavior,
-                    situations,
-                    classes,
-                )
-        else:
+        for span in its:
+            found += _given(condition, span, behavior, situations, classes, since)
+        if not its:
             found.append(condition)
     return tuple(dict.fromkeys(found))
 
 
+def with_given_effects(
+    behavior: Behavior,
+    totals: Container[str],
+    situations: Mapping[str, SituationType],
+    classes: Mapping[str, Sequence[str]],
+) -> Behavior:
+    """Return a durative behaviour whose effects have the conditions that they require before the behaviour.
+
+    In contrast to `projected`, the conditions may have alternatives, witnesses or totals, and the effects in earlier spans may
+    have conditions. The effects on `totals` are left as they are.
+    """
+    own = [(span, effect) for span, effect in timing_of(behavior).effects if effect.situation not in totals]
+
+    def given(span: Span, condition: Condition, effect: Effect) -> tuple[Condition, ...]:
+        return _given(condition, span, behavior, situations, classes, effect=effect)
+
+    _, effects = projected((), own, given)
+    if effects == projected((), own)[1]:
+        return behavior
+    others = (one for one in behavior.amounts if one.situation in totals)
+    return replace(
+        behavior,
+        effects=tuple(one for one in effects if isinstance(one, ValueEffect)),
+        amounts=(*(one for one in effects if isinstance(one, AmountEffect)), *others),
+    )
+
+
 def _given(
     condition: Condition,
-    earlier: Sequence[Span],
+    span: Span,
     behavior: Behavior,
     situations: Mapping[str, SituationType],
     classes: Mapping[str, Sequence[str]],
+    since: Span = Span.START,
+    effect: Effect | None = None,
 ) -> tuple[Condition, ...]:
-    """Return what a condition requires before the effects of a durative behaviour in earlier spans."""
-    timing, kinds = timing_of(behavior), behavior.kinds
-    bound = frozenset({p.name for p in behavior.parameters} | plain_variables(behavior.preconditions))
+    """Return what a condition in a span requires before the effects of a durative behaviour in earlier spans.
+
+    If `effect` is given, the condition is a condition of this effect, whose variables are bound, too. A condition that binds a
+    variable is left as it is.
+    """
+    timing, kinds = timing_of(behavior), dict(behavior.kinds)
+    fixed = {p.name for p in behavior.parameters}
+    bound = frozenset(fixed | plain_variables(behavior.preconditions))
+    if effect is not None:
+        each = {effect.each.name: effect.each.kind} if effect.each else {}
+        kinds, fixed = kinds | each, fixed | each.keys()
+        used = (effect.value,) if isinstance(effect, ValueEffect) else terms_of(effect.amount)
+        bound = bound.union(each, effect.arguments, used, plain_variables(effect.when))
+    binds = isinstance(condition, ValueCondition) and any(is_variable(t) and t not in fixed for t in terms(condition))
+    if binds or not isinstance(condition, AnyOf | Witness | Comparison | ValueCondition):
+        return (condition,)
+    if condition in (behavior.priced, behavior.lasting):
+        return (condition,)
     found: Simplified = condition
-    for span in reversed(earlier):
-        made = timing.made(span)
+    for earlier in reversed(tuple(Span)[tuple(Span).index(since) : tuple(Span).index(span)]):
+        made = timing.made(earlier)
         part = replace(
             behavior,
             effects=tuple(one for one in made if isinstance(one, ValueEffect)),
             amounts=tuple(one for one in made if isinstance(one, AmountEffect)),
         )
-        kinds = {**kinds, **{one.each.name: one.each.kind for one in made if one.each is not None}}
-        after = Afterwards(part, situations, classes, kinds, timing.before(span))
-        if not isinstance(found, bool) and after.changed(found):
+        if isinstance(found, bool) or not any(situations_of(one) & part.changes for one in walk(found)):
+            continue
+        kinds |= {one.each.name: one.each.kind for one in made if one.each is not None}
+        after = Afterwards(part, situations, classes, kinds, timing.before(earlier))
+        (found,) = closed([found], bound, after.kinds)
+        try:
+            found = after.condition(after.renamed(found))
+        except TooManyCasesError:
+            raise DomainError(
+                f"{behavior.name}: too many of its effects may decide one of its conditions; use fewer effects"
+            ) from None
+        if not isinstance(found, bool):
             (found,) = closed([found], bound, after.kinds)
-            try:
-                found = after.condition(after.renamed(found))
-            except TooManyCasesError:
-                raise DomainError(
-                    f"{behavior.name}: too many of its effects may decide one of its conditions; use fewer effects"
-                ) from None
-            if not isinstance(found, bool):
-                (found,) = closed([found], bound, after.kinds)
-        kinds = after.kinds
     return (found,) if not isinstance(found, bool) else () if found else (condition, NEVER)
 
 

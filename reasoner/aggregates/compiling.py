@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from itertools import chain, islice
 
@@ -15,8 +16,8 @@ from confab.reasoner.folding import Folding
 from confab.reasoner.language import DomainError, mentions, plain_variables, walk
 from confab.reasoner.limits import check
 from confab.reasoner.problem import Domain
-from confab.reasoner.symbols import AnyOf, Behavior, Condition, Effect, Span, Witness
-from confab.reasoner.timing import given_itself
+from confab.reasoner.symbols import Aggregate, AnyOf, Behavior, Condition, Effect, Span, Witness
+from confab.reasoner.timing import given_itself, with_given_effects
 
 
 def compiled(domain: Domain, classes: Mapping[str, Sequence[str]]) -> Domain:
@@ -33,17 +34,17 @@ def compiled(domain: Domain, classes: Mapping[str, Sequence[str]]) -> Domain:
     behaviors = {}
     for name, behavior in domain.behaviors.items():
         check("deriving amounts")
+        if behavior.timing is not None:
+            for one in (one for one in updated if one.situation not in domain.remembers):
+                with _few_effects(name, one, domain):
+                    behavior = keeping.kept_in_time(behavior, one, domain.situations, classes)
+            behavior = with_given_effects(behavior, domain.aggregates, domain.situations, classes)
         for one in updated:
-            try:
+            with _few_effects(name, one, domain):
                 if one.situation in domain.remembers:
                     behavior = remembering(behavior, one, domain, classes)
                 else:
                     behavior = keeping.kept(behavior, (one,), domain.situations, classes)
-            except TooManyCasesError:
-                raise DomainError(
-                    f"{name} changes the facts that determine {stated(one.situation, domain)} by too many effects at once; "
-                    "use fewer effects, or another behaviour for some of them"
-                ) from None
         if behavior.timing is not None:
             asked = given_itself(behavior, behavior.preconditions, tuple(Span), domain.situations, classes)
             behavior = replace(behavior, preconditions=asked)
@@ -57,6 +58,18 @@ def compiled(domain: Domain, classes: Mapping[str, Sequence[str]]) -> Domain:
                 "conditions; let fewer of its effects change them, or let no derived amount depend on another"
             )
     return replace(domain, behaviors=behaviors)
+
+
+@contextmanager
+def _few_effects(name: str, one: Aggregate, domain: Domain) -> Iterator[None]:
+    """Raise `DomainError` if too many effects of a behaviour change a derived amount or a remembered situation type."""
+    try:
+        yield
+    except TooManyCasesError:
+        raise DomainError(
+            f"{name} changes the facts that determine {stated(one.situation, domain)} by too many effects at once; "
+            "use fewer effects, or another behaviour for some of them"
+        ) from None
 
 
 def _prevented(behavior: Behavior, domain: Domain, classes: Mapping[str, Sequence[str]]) -> Behavior:

@@ -84,24 +84,25 @@ def kept(
     """
     for aggregate in aggregates:
         if aggregate.kept and read_by(aggregate) & behavior.changes:
-            found = _Keeping(behavior, aggregate, situations, classes).behavior()
-            behavior = found if found.timing is None else _timed(found, aggregate, situations, classes)
+            behavior = _Keeping(behavior, aggregate, situations, classes).behavior()
     return behavior
 
 
-def _timed(
+def kept_in_time(
     behavior: Behavior,
     aggregate: Aggregate,
     situations: Mapping[str, SituationType],
     classes: Mapping[str, Sequence[str]],
 ) -> Behavior:
-    """Return a durative behaviour that changes a total at the same times as the facts on which the total depends.
+    """Return a durative behaviour whose timing changes a total at the same times as the facts on which the total depends.
 
     Effects at the start of the behaviour change the total at the start, under the conditions at the start. The same holds for the
     end.
     """
     timing = behavior.timing
     assert timing is not None
+    if not aggregate.kept:
+        return behavior
     read, effects = read_by(aggregate), list(timing.effects)
     for span in dict.fromkeys(span for span, effect in effects if effect.situation in read):
         made = timing.made(span)

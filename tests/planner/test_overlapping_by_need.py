@@ -424,6 +424,59 @@ def test_a_step_may_give_itself_an_alternative_a_witness_or_a_total_that_it_need
     assert solve(Request(taken, limits=Limits(seconds=10.0))).status is Status.UNSOLVABLE
 
 
+@pytest.mark.parametrize("level", [1, 2])
+@pytest.mark.parametrize(
+    "condition",
+    [
+        has("G", "?t", TRUE),
+        AnyOf(((has("G", "?t", TRUE),), (has("P", "?t", TRUE),))),
+        Witness("?u", "T", (has("G", "?u", TRUE),)),
+        Comparison(Amount("MANY", ()), ">=", Fraction(1)),
+    ],
+)
+def test_the_conditions_of_an_effect_at_the_end_follow_the_effects_at_the_start(
+    condition: Condition, level: int
+) -> None:
+    """The effect at the start has a condition, too."""
+    started = Comparison(Amount("N", ("?t",)), "=", Fraction(0))
+
+    def task(value: str) -> Problem:
+        start, end = (
+            replace(becomes("G", "?t", value), when=(started,)),
+            replace(becomes("P", "?t", TRUE), when=(condition,)),
+        )
+        problem = counting(spanned(level, (), ((Span.START, start), (Span.END, end)), "P"), level)
+        before = {
+            Symbol("G", ("t",)): FALSE if value == TRUE else TRUE,
+            Symbol("MANY", ()): "0" if value == TRUE else "1",
+        }
+        return replace(problem, initial={**problem.initial, **before})
+
+    outcome = solve(Request(task(TRUE), limits=Limits(seconds=10.0)))
+    assert outcome.plan is not None
+    assert [step.behavior for step in outcome.plan.primitives] == ["W"]
+    assert not validate(task(TRUE), outcome.plan)
+    assert validate(task(FALSE), outcome.plan)
+    assert solve(Request(task(FALSE), limits=Limits(seconds=10.0))).status is Status.UNSOLVABLE
+
+
+@pytest.mark.parametrize("level", [1, 2])
+@pytest.mark.parametrize("span", [Span.THROUGHOUT, Span.END])
+def test_a_condition_follows_an_effect_at_the_start_that_has_a_condition(span: Span, level: int) -> None:
+    def task(value: str) -> Problem:
+        start = replace(becomes("G", "?t", value), when=(Comparison(Amount("N", ("?t",)), "=", Fraction(0)),))
+        made = (Span.START, start), (Span.END, becomes("P", "?t", TRUE))
+        problem = spanned(level, ((span, has("G", "?t", TRUE)),), made, "P")
+        problem = replace(problem, domain=compiled(problem.domain, problem.classes))
+        return replace(problem, initial={**problem.initial, Symbol("G", ("t",)): FALSE if value == TRUE else TRUE})
+
+    outcome = solve(Request(task(TRUE), limits=Limits(seconds=10.0)))
+    assert outcome.plan is not None
+    assert [step.behavior for step in outcome.plan.primitives] == ["W"]
+    assert validate(task(FALSE), outcome.plan)
+    assert solve(Request(task(FALSE), limits=Limits(seconds=10.0))).status is Status.UNSOLVABLE
+
+
 def counting(problem: Problem, level: int) -> Problem:
     """Return a compiled problem with the number MANY of the individuals of which G is true, on a level."""
     kinds = {**problem.domain.situations, "MANY": SituationType("MANY", (), "MANY", level, quantity=Quantity())}
