@@ -14,7 +14,7 @@ import networkx
 
 from confab.planner.plan import Plan, Reason, Step, renumbered
 from confab.planner.timed.activities import InapplicableError, StepEvent, activities, in_sequence
-from confab.planner.timed.bounds import of_any_plan
+from confab.planner.timed.bounds import of_any_plan, too_early
 from confab.planner.timed.exchange import choices_of, exchanged
 from confab.planner.timed.network import Begins, Network, network_of
 from confab.planner.timed.order import END, Order, TurnId, order_in_sequence, order_of
@@ -93,6 +93,8 @@ def best_in_time(
         found = in_time(problem, plan, left(0.25 if shorten else 1.0), separation)
     except LimitError as limit:
         return Timed(reason=Reason(str(limit)))
+    if found.late and (reason := impossible(problem, left(0.25))) is not None:
+        return replace(found, reason=reason)
     bound = Fraction(0)
     if shorten:
         with suppress(LimitError), within(left(0.25)):
@@ -108,6 +110,18 @@ def best_in_time(
     if found.plan is None or not shorten:
         return found
     return replace(found, plan=replace(found.plan, least=bound, bound=max(found.plan.bound, bound)))
+
+
+def impossible(problem: Problem, seconds: float | None = None) -> Reason | None:
+    """Return the reason why no plan keeps a deadline, or None if no such reason is known."""
+    with suppress(LimitError), within(seconds):
+        found = too_early(problem)
+        if found is not None:
+            times = problem.times or Times()
+            by, least = (f"{float(times.since + at):g}" for at in (times.deadlines[found.goal], found.least))
+            goal = f"{said_by(problem, found.goal)} is a goal by {by} s"
+            return Reason(f"{goal}, but no plan reaches it in less than {least} s", (*found.goal.arguments,))
+    return None
 
 
 def keeps_times(problem: Problem, plan: Plan) -> bool:

@@ -12,7 +12,7 @@ from confab.memory import Memory
 from confab.planner.hierarchical.planner import plan
 from confab.planner.plan import Limits, Outcome, Plan, Reason, Status, Step
 from confab.planner.solve import Request, solve
-from confab.planner.timed.bounds import of_any_plan
+from confab.planner.timed.bounds import of_any_plan, too_early
 from confab.planner.timed.call import Timed, best_in_time, in_time
 from confab.planner.timed.measuring import measured, with_durations
 from confab.planner.timed.plan import Slot, TimedPlan, schedule_of
@@ -454,6 +454,25 @@ def test_the_bound_of_any_plan_is_not_above_the_least_makespan() -> None:
             bounds.append(of_any_plan(problem_of(world)))
     assert [(bound, known) for bound, known in zip(bounds, least, strict=True) if bound > known] == []
     assert sum(bounds) >= 0.8 * sum(least)
+
+
+def test_a_deadline_is_called_impossible_only_if_no_plan_keeps_it() -> None:
+    wrong, proved, count = [], 0, 0
+    for seed in range(15_000, 15_030):
+        for kind in (dict[str, bool](), {"limited": True}, {"shared": True}):
+            world = timed_world(seed, **kind)
+            least, problem = least_makespan(world), problem_of(world)
+            if least is None:
+                continue
+            times = problem.times or Times()
+            for by in (least, least - 1):
+                deadlines = {s: min(times.deadlines.get(s, Fraction(by)), Fraction(by)) for s in problem.goal}
+                found = too_early(replace(problem, times=replace(times, deadlines=deadlines)))
+                wrong += [(seed, kind, found)] if by == least and found is not None else []
+                proved += by < least and found is not None
+            count += 1
+    assert wrong == []
+    assert proved >= 0.4 * count
 
 
 def test_the_bound_of_any_plan_proves_that_no_plan_is_shorter(tmp_path: Path) -> None:

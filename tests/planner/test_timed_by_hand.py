@@ -239,6 +239,24 @@ def test_the_reason_names_the_missed_deadline_and_the_actor_of_the_schedule() ->
     assert "SEEN" not in reason.text
 
 
+def test_a_deadline_that_no_plan_keeps_is_given_up_at_once_with_the_least_time_of_the_goal() -> None:
+    problem = jobs(("r1", "r2"), {"r1": FROM_100, "r2": FROM_100})
+    plan = solve(Request(problem)).plan
+    assert plan is not None
+    told = best_in_time(
+        replace(problem, times=replace(problem.times or Times(), deadlines=dict.fromkeys(problem.goal, Fraction(109)))),
+        plan,
+    )
+    assert told.plan is None
+    assert told.reason is not None
+    assert "is a goal by 109 s, but no plan reaches it in less than 110 s" in told.reason.text
+    kept = best_in_time(
+        replace(problem, times=replace(problem.times or Times(), deadlines=dict.fromkeys(problem.goal, Fraction(110)))),
+        plan,
+    )
+    assert kept.plan is not None
+
+
 def test_missed_times_are_a_better_reason_than_a_fault_of_another_kind() -> None:
     other, late, later = Timed(reason=Reason("no order")), Timed(late=Fraction(5)), Timed(late=Fraction(6))
     assert [
