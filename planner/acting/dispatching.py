@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from confab.planner.acting.schedule import WorkerSlot
 from confab.planner.plan import Plan, Reason, Step
-from confab.planner.timed.activities import in_sequence
 from confab.planner.timed.call import Timed, in_time
 from confab.planner.timed.dispatch import Dispatch
 from confab.planner.timed.plan import TimedPlan
@@ -42,12 +41,15 @@ class Remaining:
         The dispatch; its clock begins with 0.
     paths : tuple of path
         The path of each primitive of the dispatch in the tree of steps.
+    steps : tuple of Step
+        The remaining steps, with the external events that happen meanwhile.
     given_up : tuple of Symbol
         The goals whose deadlines can't be kept.
     """
 
     dispatch: Dispatch
     paths: tuple[tuple[int, ...], ...]
+    steps: tuple[Step, ...]
     given_up: tuple[Symbol, ...] = ()
 
 
@@ -71,30 +73,61 @@ def _open(
 
 
 def remaining(
-    problem: Problem, primitives: Sequence[Step], seconds: Fraction, together: Concurrency
+    problem: Problem,
+    steps: tuple[Step, ...],
+    seconds: Fraction,
+    together: Concurrency,
+    free: int,
+    happened: Container[str],
 ) -> Remaining | Reason:
-    """Return the dispatch of primitives that are applicable one after another, or the reason why they have no schedule.
+    """Return the dispatch of steps that are applicable one after another, or the reason why they have no schedule.
 
     Parameters
     ----------
     problem : Problem
         The task; its initial state is the present situation.
-    primitives : sequence of Step
+    steps : tuple of Step
     seconds : Fraction
         The time since the beginning of the plan.
     together : Concurrency
         The schedule is used if it is a schedule of the primitives.
+    free : int
+        The number of the first external event that happens meanwhile and isn't one of the steps.
+    happened : container of str
+        The behaviours of executed primitives.
     """
-    times = later(problem.times or Times(), seconds)
+    primitives, every = Plan(steps).primitives, problem.times or Times()
+    times = later(every, seconds)
+    times = replace(times, events={name: at for name, at in times.events.items() if name not in happened})
+    for step in primitives:
+        if step.behavior in every.events.keys() - times.events.keys():
+            return Reason(f"{step}: it happens only once, at {float(every.events[step.behavior]):g} s")
     flat = Plan(tuple(replace(step, path=(number,)) for number, step in enumerate(primitives)))
     found, given_up = Timed(together.schedule), tuple[Symbol, ...]()
     if together.schedule is None or [*map(_kind, together.schedule.plan.primitives)] != [*map(_kind, primitives)]:
         found, given_up = _scheduled(replace(problem, times=times), flat)
     if found.plan is None:
         return found.reason or Reason("the remaining steps have no schedule")
+    scheduled = found.plan.plan.primitives
+    steps = _with_events(steps, scheduled, free)
     kept = replace(times, deadlines={goal: by for goal, by in times.deadlines.items() if goal not in given_up})
     dispatch = Dispatch(replace(problem, times=kept), found.plan, together.spread, same_actors=True)
-    return Remaining(dispatch, _paths(found.plan.plan.primitives, primitives), given_up)
+    return Remaining(dispatch, _paths(scheduled, Plan(steps).primitives), steps, given_up)
+
+
+def _with_events(steps: tuple[Step, ...], scheduled: Sequence[Step], free: int) -> tuple[Step, ...]:
+    """Return steps with the scheduled primitives that aren't below them, each after the steps that have begun before it."""
+    known = {_kind(step) for step in Plan(steps).primitives}
+    for number, event in enumerate(scheduled):
+        if _kind(event) not in known:
+            earlier = {_kind(step) for step in scheduled[:number]}
+            begun = (
+                i for i, step in enumerate(steps, 1) if any(_kind(one) in earlier for one in Plan((step,)).primitives)
+            )
+            place = max(begun, default=0)
+            steps = (*steps[:place], replace(event, path=(free,)), *steps[place:])
+            free += 1
+    return steps
 
 
 def _scheduled(problem: Problem, plan: Plan) -> tuple[Timed, tuple[Symbol, ...]]:
@@ -105,7 +138,7 @@ def _scheduled(problem: Problem, plan: Plan) -> tuple[Timed, tuple[Symbol, ...]]
         kept = {goal: by for goal, by in times.deadlines.items() if goal not in given_up}
         asked = replace(problem, times=replace(times, deadlines=kept))
         searched = None if kept or times.windows else 0.0
-        found = in_time(asked, plan, searched, events=list(in_sequence(plan.primitives)))
+        found = in_time(asked, plan, searched, same_actors=True)
         if found.plan is not None:
             return found, given_up
         first = first if first.reason else found

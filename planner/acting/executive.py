@@ -115,6 +115,8 @@ def act(
                 run.finish()
             elif run.together and (left := run.remaining()) is not None:
                 run.perform_together(left)
+            elif run.requested:
+                continue
             elif (expected := run.expected()) is None:
                 run.request_replan("the next primitive's precondition doesn't hold")
             else:
@@ -337,13 +339,16 @@ class _RunningEpisode:
     def remaining(self) -> Remaining | None:
         """Return the dispatch of the remaining primitives; without a schedule, one primitive at a time is executed from now on."""
         assert self.together is not None
-        now = Fraction(self.world.seconds)
-        found = remaining(self.belief.task, Plan(self.agenda.steps).primitives, now, self.together)
+        now, steps = Fraction(self.world.seconds), self.agenda.steps
+        free = 1 + max(path[0] for path in (*self.record.done, *(step.path for step in steps)))
+        happened = {event.step.behavior for event in self.record.events}
+        found = remaining(self.belief.task, steps, now, self.together, free, happened)
         if isinstance(found, Reason):
             self.together, times = None, self.belief.problem.times or Times()
             if times.windows or times.events:  # one primitive after another would ignore them
                 self.give_up(found)
             return None
+        self.agenda.steps = found.steps
         for goal in found.given_up:
             self.tell_late(goal, now)
         return found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Set
+from collections.abc import Callable, Container, Iterable, Mapping, Set
 from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
@@ -102,6 +102,11 @@ class SymbolicWorld:
             slot = WorkerSlot(course.steps[number], number, worker, float(start + begin), float(start + now))
             ended[number] = slot, verdict
 
+        def interrupt(stopped: Container[int]) -> None:
+            for _, number, begin in [one for one in running if one[1] in stopped]:
+                report(number, begin, _interrupted(course.steps[number]))
+            running[:] = sorted(one for one in running if one[1] not in stopped)
+
         def going_on() -> bool:
             return all(verdict.ok for _, verdict in ended.values()) and may_begin(ended.keys())
 
@@ -116,6 +121,7 @@ class SymbolicWorld:
                 dispatch.begin(number, now)
                 given = self._seconds_of.get(course.steps[number].behavior, course.seconds[number])
                 heappush(running, (now + self._stretch(Fraction(given)), number, now))
+                interrupt(course.lost(other for _, other, _ in running if other != number))
             wakes = dispatch.wakes(now) if going_on() else None
             times = [end for end, *_ in running[:1]] + ([] if wakes is None else [wakes])
             if not times:
@@ -124,10 +130,7 @@ class SymbolicWorld:
                 self.state = course.facts.state()
                 self._disturbed_by_the_clock()
                 now = max(now, Fraction(self.seconds) - start)
-                stopped = course.change(self.state)
-                for _, number, begin in [one for one in running if one[1] in stopped]:
-                    report(number, begin, _interrupted(course.steps[number]))
-                running = sorted(one for one in running if one[1] not in stopped)
+                interrupt(course.change(self.state))
                 continue
             now = dispatch.misses(now, min(times)) or min(times)
             self.seconds = float(start + now)
@@ -135,6 +138,7 @@ class SymbolicWorld:
                 _, number, begin = heappop(running)
                 report(number, begin, self._ended(course, number))
                 dispatch.end(number, now)
+                interrupt(course.lost(other for _, other, _ in running))
         self.state = course.facts.state()
         return sorted(ended.values(), key=lambda one: (one[0].begin, one[0].position))
 
@@ -235,7 +239,7 @@ class SymbolicWorld:
 
 
 def _interrupted(step: Step) -> WorldReport:
-    return WorldReport(False, INTERRUPTED, step.arguments, "an intervention changed a fact on which it depends")
+    return WorldReport(False, INTERRUPTED, step.arguments, "a fact on which it depends has changed")
 
 
 def _inapplicable(step: Step, why: str) -> WorldReport:

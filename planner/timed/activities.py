@@ -194,6 +194,15 @@ class StepSimulation:
             self.facts.put(*cell, after)
         self.made[number]["end"] = self.done(self.steps[number], self.piece(number).end, self.terms[number], True)
 
+    def lost(self, numbers: Iterable[int]) -> list[int]:
+        """Return the begun steps whose conditions throughout don't hold any more."""
+        found = []
+        for number in numbers:
+            held = self.piece(number).held
+            if held.preconditions and self.rules.changes(held, self.terms[number], self.facts) is None:
+                found.append(number)
+        return found
+
     def changes(self, number: int, *parts: str) -> dict[Symbol, str]:
         """Return the symbols that parts of a step (``begin``, ``middle``, ``end``) change, each with its new value."""
         made = [self.made[number].get(part, Access()) for part in parts]

@@ -171,8 +171,9 @@ def in_time(
     seconds: float | None = None,
     separation: Fraction = Fraction(0),
     events: Sequence[StepEvent] | None = None,
+    same_actors: bool = False,
 ) -> Timed:
-    """Return a timed plan with the steps of a plan.
+    """Return a timed plan with the steps of a plan, and with the external events that happen before its end.
 
     Parameters
     ----------
@@ -185,6 +186,8 @@ def in_time(
         The minimum time between conflicting events, in seconds (epsilon in PDDL).
     events : sequence of StepEvent, optional
         The order of the begins and ends of the primitives; by default the primitives are executed one after another.
+    same_actors : bool
+        Whether every primitive keeps its actors, as it does if `events` are given.
     """
     until = inf if seconds is None else perf_counter() + seconds
 
@@ -198,7 +201,7 @@ def in_time(
     except InapplicableError as error:
         return Timed(reason=Reason(str(error)))
     network = network_of(order, separation)
-    choices = choices_of(problem, plan, order, network) if events is None else ActorChoices()
+    choices = ActorChoices() if same_actors or events is not None else choices_of(problem, plan, order, network)
     proved: int | None = None  # the first choices allow the most schedules
     while True:
         bound = least(order, network, choices)
@@ -227,10 +230,11 @@ def in_time(
                 if not faults:
                     return Timed(timed)
                 if events is None and (missing := omitted(problem, timed)):
-                    whole = _with_events(problem, timed, missing, separation)
-                    complete = Timed() if whole is None else in_time(problem, whole, left(), separation)
-                    if complete.plan is not None:
-                        return complete
+                    whole = _with_events(problem, timed, missing, separation, same_actors)
+                    if whole is not None:
+                        complete = in_time(problem, whole, left(), separation, same_actors=same_actors)
+                        if complete.plan is not None:
+                            return complete
         if not choices.of and until:
             until = 0.0  # no search: the turns keep the plan's order
             continue
@@ -242,7 +246,7 @@ def in_time(
 
 
 def _with_events(
-    problem: Problem, timed: TimedPlan, missing: Mapping[str, Fraction], separation: Fraction
+    problem: Problem, timed: TimedPlan, missing: Mapping[str, Fraction], separation: Fraction, same_actors: bool
 ) -> Plan | None:
     """Return the plan with missing external events, or None if no place of an event has a schedule.
 
@@ -261,7 +265,7 @@ def _with_events(
         last = max(begun, default=0)
         for place in range(last, max(last - MOST_PLACES, 0) - 1, -1):
             plan = replace(now.plan, steps=renumbered((*steps[:place], *waiting, *steps[place:])))
-            found = in_time(asked, plan, 0.0, separation)
+            found = in_time(asked, plan, 0.0, separation, same_actors=same_actors)
             if found.plan is not None:
                 now, waiting = found.plan, []
                 break

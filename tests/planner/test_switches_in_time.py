@@ -112,6 +112,55 @@ def test_a_soft_goal_that_an_external_event_undoes_is_unmet(tmp_path: Path) -> N
     assert [str(one.fact) for one in outcome.forgone] == ["a2 ON true"]
 
 
+REPAIR = node(
+    "REPAIR", "Behavior", "", f" ; c:level 1 ; c:index 9 ; c:actor :v ; c:postcondition :repaired{lasts(1)}"
+) + node("repaired", "ValueEffect", "a")
+
+
+def executed(execution: confab.Execution) -> list[tuple[str, float, float, bool]]:
+    return [(event.step.behavior, event.begin, event.end, event.ok) for event in execution.episode.events]
+
+
+def test_an_external_event_stops_a_late_step_that_needs_what_the_event_changes(tmp_path: Path) -> None:
+    goals = node("task", "Task", "", " ; c:goal :done, :dark") + node("done", "ValueCondition", "b")
+    goals += node("dark", "ValueCondition", "a", OFF)
+    scene = load(tmp_path, WORK, happening("E12", 12, "twelve", "a", OFF), goals)
+    assert scene.execute().reached
+    late = scene.execute(perturb=True, seed=2)
+    assert executed(late)[:2] == [("WORK", 0.0, 12.0, False), ("E12", 12.0, 12.0, True)]
+    assert not late.reached
+
+
+@pytest.mark.parametrize("seconds", [8, 12, 20])
+def test_new_steps_of_an_episode_take_place_beside_external_events(seconds: int, tmp_path: Path) -> None:
+    scene = load(tmp_path, WORK, REPAIR, happening("EVENT", seconds, "b2.on", "b2"), DONE)
+    execution = scene.execute(interventions=["at=5 a ON false"])
+    assert execution.reached
+    happened = [("EVENT", seconds, seconds, True)] if seconds < 16 else []
+    worked = [("WORK", 0.0, 5.0, False), ("REPAIR", 5.0, 6.0, True), ("WORK", 6.0, 16.0, True)]
+    assert executed(execution) == [*worked, *happened]
+
+
+def test_an_episode_begins_no_step_after_it_has_given_up(tmp_path: Path) -> None:
+    """The step for the third goal is executed; the event is over when a person has undone what it changed."""
+    last = node(
+        "LAST",
+        "Behavior",
+        "",
+        f" ; c:level 1 ; c:index 8 ; c:actor :v ; c:precondition :done ; c:postcondition :a2.on{lasts(10)}",
+    )
+    goals = node("task", "Task", "", " ; c:goal :done, :dark, :last") + node("done", "ValueCondition", "b")
+    goals += (
+        node("dark", "ValueCondition", "a", OFF)
+        + node("last", "ValueCondition", "a2")
+        + node("a2.on", "ValueEffect", "a2")
+    )
+    scene = load(tmp_path, WORK, REPAIR, last, happening("E12", 12, "twelve", "a", OFF), goals)
+    execution = scene.execute(interventions=["at=13 a ON true"])
+    assert [name for name, *_ in executed(execution)] == ["WORK", "LAST", "E12"]
+    assert "it happens only once, at 12 s" in str(execution.episode.reasons[0])
+
+
 @pytest.mark.parametrize("proved", [False, True])
 @pytest.mark.parametrize(("wanted", "status"), [(1, Status.SOLVED), (2, Status.GAVE_UP)])
 def test_an_external_event_happens_only_once(wanted: int, status: Status, proved: bool, tmp_path: Path) -> None:
