@@ -219,6 +219,17 @@ class Definitions:
             f"define it as 'SomeClass and (…)'"
         )
 
+    def required(self, iri: str) -> set[str]:
+        """Return the static classes that contain all members of a class according to its definition, not their superclasses."""
+
+        def parts(each: str) -> Sequence[str]:
+            if _blank(each):
+                return self._list(each, "intersectionOf")
+            return self._definitions(each) if self.changes(each) and each not in self.concluded else ()
+
+        owners = (self.concluded.get(each, (each, each))[1] for each in closure([iri], parts) if not _blank(each))
+        return {each for each in owners if each and not self.changes(each)}
+
     def conditions(self, term: str, iri: str, negated: bool = False) -> tuple[Condition, ...]:
         """Return the conditions that a term is a member of a class: a class condition, or the definition of a changing class."""
         if not self.changes(iri):

@@ -415,9 +415,10 @@ def _check_behavior(behavior: Behavior, domain: Domain) -> None:
 def _check_classes(schema: Parts, iri: str, owners: Sequence[str], supers: Mapping[str, Sequence[str]]) -> None:
     """Raise `KnowledgeError` if conditions define a class whose individuals have a situation type or are its values."""
     for kind in filter(schema.definitions.changes, sorted(supers)):
-        base = schema.definitions.base(kind)
-        above, implied = (closure([each], lambda one: supers.get(one, ())) for each in (kind, base))
+        required = schema.definitions.required(kind)
+        above, implied = (closure(each, lambda one: supers.get(one, ())) for each in ([kind], required))
         if iri in above - implied:
+            base = schema.definitions.base(kind)
             raise KnowledgeError(
                 f"{local_name(kind)} is a subclass of the situation type {local_name(iri)}, but the definition of "
                 f"{local_name(kind)} becomes conditions, so its members can't be values; make {local_name(base)} the subclass, or "

@@ -297,6 +297,20 @@ def test_a_class_that_becomes_conditions_has_no_values(tmp_path: Path) -> None:
         read(load(path))
 
 
+def test_a_class_that_becomes_conditions_may_have_values_that_another_class_of_its_definition_contains(
+    tmp_path: Path,
+) -> None:
+    close = ":Close a owl:Class, owl:NamedIndividual ; rdfs:subClassOf :Place, :NEAR . :hook a owl:NamedIndividual, :Close ."
+    near = (
+        ":NEAR a owl:Class, owl:NamedIndividual, c:SituationType ; c:valueProperty :near ; c:defaultValue :hook . "
+        ":near a owl:ObjectProperty, owl:FunctionalProperty, owl:NamedIndividual . "
+        ":Item c:hasSituationType :NEAR . :Special rdfs:subClassOf :NEAR ."
+    )
+    inner = both(":Close", "[ a owl:Class ; owl:complementOf :Sink ]")
+    infer(graph := load(scene(tmp_path, defined(both(":Place", inner)), close, near, asked="Item")))
+    assert read(graph).problem.classes["NEAR"] == ("hook",)
+
+
 def test_a_rule_concludes_nothing_about_individuals_that_lack_its_situation_type() -> None:
     """The total adds up individuals of which a rule concludes D0, but no class of these individuals has D0."""
     problem = read(load(Path(__file__).parents[1] / "planner" / "cases" / "rule-of-another-class.ttl")).problem
