@@ -32,11 +32,13 @@ def load_scene(source: str, iri: str | None = None, changed: bool = True) -> Sce
     If `changed`, the scene has the facts of the option ``--fact``, and lacks the goals of ``--without-goal``.
     """
     from confab.reaching import with_current_reach
+    from confab.reasoner.limits import check
     from confab.scene import load_text, read
 
     with progress(f"reading {'stdin' if source == '-' else source}"):
         scene = load_text(sys.stdin.buffer.read()) if source == "-" else read(source, scene=iri)
     scene = with_current_reach(scene, remark)
+    check("reading the scene")  # the imports of the planner and of the executive take almost a second
     return with_changes(scene) if changed else scene
 
 
@@ -48,10 +50,16 @@ def with_changes(scene: Scene) -> Scene:
     return scene.without_goal(*goals) if goals else scene
 
 
+VALIDATING = 1.0
+"""Minimum remaining seconds for a quick validation, most of which the imports of its modules take."""
+
+
 def warn_of_errors(scene: Scene, deadline: Deadline) -> None:
-    """Print the first error that a quick validation finds in an unchanged scene file of the user, if time is left."""
-    path = scene.knowledge.path
-    if path is None or path.is_relative_to(ontology.ROOT) or deadline.left == 0 or scene.knowledge.changes:
+    """Print the first error that a quick validation finds in an unchanged scene file of the user, if enough time is left."""
+    path, left = scene.knowledge.path, deadline.left
+    if path is None or path.is_relative_to(ontology.ROOT) or scene.knowledge.changes:
+        return
+    if left is not None and left < VALIDATING:
         return
     from confab.reasoner.limits import LimitError, within
     from confab.reasoner.validation.validate import quick_errors

@@ -283,6 +283,7 @@ def write_out(graph: KnowledgeGraph) -> list[UpdateFault]:
     texts = map(ox.NamedNode, (*SPARQL_TEXTS, CORE + "extends"))
     if not any(next(graph.store.quads_for_pattern(None, one, None, None), None) for one in texts):
         return []
+    check("reading updates")
     from confab.reasoner.updates.compiling import compiled
 
     found = compiled(lambda query: graph.select(query, SCENE), _spelled(graph), graph.prefixes)

@@ -15,6 +15,7 @@ from click.testing import CliRunner
 
 import confab
 from confab.cli import COMMANDS, app
+from confab.commands.given import warn_of_errors
 from confab.commands.options import Seconds
 from confab.execution import Execution
 from confab.planner.hierarchical import planner as hierarchical
@@ -26,7 +27,8 @@ from confab.reasoner.generate import write_scene
 from confab.reasoner.graph import query_process
 from confab.reasoner.graph.knowledge import KnowledgeGraph
 from confab.reasoner.graph.query_process import QueryLimits, _dumped
-from confab.reasoner.limits import LimitError, OutOfTimeError, current
+from confab.reasoner.limits import Deadline, LimitError, OutOfTimeError, current
+from confab.reasoner.validation.findings import Finding
 from confab.scene import Scene
 from confab.terminal import GAVE_UP
 
@@ -172,6 +174,23 @@ def test_explaining_a_plan_is_within_the_limit_of_planning_it(monkeypatch: pytes
     monkeypatch.setattr(Result, "explain", watched)
     confab.load("beverage-serving").explain(time_limit=60.0)
     assert held == [60.0]
+
+
+def test_a_command_begins_no_quick_validation_shortly_before_its_time_limit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: list[object] = []
+
+    def quick_errors(graph: KnowledgeGraph) -> list[Finding]:
+        calls.append(graph)
+        return []
+
+    monkeypatch.setattr("confab.reasoner.validation.validate.quick_errors", quick_errors)
+    confab.load("two-cups").save(tmp_path / "saved.ttl")
+    loaded = confab.load(str(tmp_path / "saved.ttl"))
+    for seconds, count in ((0.5, 0), (60.0, 1)):
+        warn_of_errors(loaded, Deadline.after(seconds))
+        assert len(calls) == count
 
 
 @pytest.mark.parametrize("limit", ["5", math.nan])
