@@ -147,7 +147,11 @@ class Memory(metaclass=RightNames):
             found = cls(lambda: load_links(path, names, read), names, iri)
             lines = read
             if ":memoryFormat" in lines.rest or "core#memoryFormat" in lines.rest:
-                found.experience = parse(lines, str(path), names)
+                try:
+                    found.experience = parse(lines, str(path), names)
+                except KnowledgeError:
+                    refuse_another_kind(path)  # a scene that was saved in one file has the word in its vocabulary
+                    raise
             elif not len(found.links):
                 refuse_another_kind(path)
                 raise KnowledgeError(f"{path}: holds no memory; without it, 'confab learn' makes a new one")

@@ -142,8 +142,9 @@ def test_a_scene_in_the_place_of_a_memory_is_named_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    name = skeleton(tmp_path).name
-    with pytest.raises(SystemExit, match="2"):
-        main(["memory", "show", name])
-    wanted = f"confab: wanted a memory; {name} is a scene; use: confab plan {name} | "
-    assert capsys.readouterr().err.startswith(wanted)
+    confab.load("two-cups").save("saved.ttl")
+    for name in (skeleton(tmp_path).name, "saved.ttl"):
+        with pytest.raises(SystemExit, match="2"):
+            main(["memory", "show", name])
+        wanted = f"confab: wanted a memory; {name} is a scene; use: confab plan {name} | "
+        assert capsys.readouterr().err.startswith(wanted)
