@@ -118,6 +118,7 @@ def plan(
     from confab.plan_options import PlanOptions, leaves_levels
     from confab.planning import plan_by
     from confab.show import summary
+    from confab.timing import lanes
 
     free = leaves_levels(levels)
     others = {
@@ -153,7 +154,7 @@ def plan(
     if report is not None:
         remark(f"the page is {result.report(report)}")
     if out is not None:
-        told(result.save(out), summary(result.outcome))
+        told(result.save(out), "\n".join((summary(result.outcome), *(lanes(result.timed) if result.timed else ()))))
     else:
         # The library rich, whose import takes time, prints only plans: without a plan, the time limit may be over.
         show_result(result.json() if as_json else result if result.solved else str(result))

@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 import confab
-from confab.cli import app
+from confab.cli import app, main
 from confab.execution import Execution
 from confab.memory import Memory
 from confab.planner.acting.symbolic_world import SymbolicWorld
@@ -60,6 +60,17 @@ def learned(seeds: range) -> Memory:
     for seed in seeds:
         memory.measure(scene().problem, executed(seed).episode)
     return memory
+
+
+def test_the_command_that_writes_a_plan_into_a_file_prints_its_schedule(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = planned()
+    monkeypatch.setattr("confab.planning.plan_by", lambda *_: found)
+    with pytest.raises(SystemExit, match="0"):
+        main(["plan", "beverage-serving", "--minimise", "makespan", "-o", str(tmp_path / "plan.json")])
+    said = capsys.readouterr().out
+    assert said.startswith(f"{tmp_path / 'plan.json'}: solved") and "\nmakespan " in said and "\nleft_hand" in said
 
 
 def test_ten_episodes_predict_the_eleventh_within_its_spread() -> None:
