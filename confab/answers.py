@@ -82,7 +82,7 @@ def scenes(folder: Path) -> str:
 def planned(scene: Scene, goals: Sequence[str], facts: Sequence[str], mode: Mode, seconds: float) -> Result:
     """Plan in a scene in which `facts` replace the facts about the same symbols, and return the result."""
     return (scene.with_fact(*facts) if facts else scene).plan(
-        list(goals), mode=mode, time_limit=seconds, engine=None if mode == "paper" else NO_ENGINE
+        list(goals), mode=mode, time_limit=seconds, engine=NO_ENGINE
     )
 
 

@@ -13,6 +13,7 @@ from click.testing import CliRunner
 
 import confab
 from confab import engines
+from confab.answers import planned
 from confab.cli import app
 from confab.engines import Answer, answer, at_rest, plan_by_engine, some_installed
 from confab.planner.grounded.best_first import search
@@ -92,6 +93,9 @@ def test_an_installed_engine_runs_if_the_own_search_gives_up(monkeypatch: pytest
     result = scene.plan(time_limit=60)
     assert result.solved and result.json()["engine"] == "any"
     assert scene.plan(engine="none").outcome is gave_up
+    assert planned(scene, [], [], "guarded", 60.0).outcome is gave_up  # an agent's call
+    monkeypatch.setattr("confab.plan_call.solve", lambda _: gave_up)
+    assert planned(scene, [], [], "paper", 60.0).outcome is gave_up
     monkeypatch.setattr(engines, "answer", lambda *_: ("e", "TIMEOUT", []))
     for seconds, when in ((60, "then"), (None, "before")):
         outcome = scene.plan(time_limit=seconds).outcome
