@@ -12,8 +12,9 @@ import pytest
 
 from confab import ontology
 from confab.reasoner.graph.inference import infer
-from confab.reasoner.graph.knowledge import KnowledgeGraph, load, text
+from confab.reasoner.graph.knowledge import BASE, KnowledgeGraph, load, text
 from confab.reasoner.names import local_name
+from confab.reasoner.vocabulary import CORE, TYPE
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,15 @@ def test_a_question_has_another_answer_without_the_triples_that_it_needs(questio
 def test_each_goal_is_listed_whatever_its_initial_value(name: str, rows: list[str]) -> None:
     wanted = next(question for question in QUESTIONS if question.name == "what-is-wanted")
     assert answer(scene(name), wanted) == rows
+
+
+def test_a_goal_that_combines_conditions_is_listed_by_its_name() -> None:
+    graph, wanted = scene("canteen-small"), next(one for one in QUESTIONS if one.name == "what-is-wanted")
+    (task,) = {quad.subject for quad in graph.store.quads_for_pattern(None, ox.NamedNode(CORE + "goal"), None, None)}
+    either = ox.NamedNode("https://example.org/either")
+    for triple in ((task, CORE + "goal", either), (either, TYPE, ox.NamedNode(CORE + "AnyOf"))):
+        graph.store.add(ox.Quad(triple[0], ox.NamedNode(triple[1]), triple[2], ox.NamedNode(BASE + "asserted")))
+    assert answer(graph, wanted) == ["either | AnyOf | true | ", *answer(scene("canteen-small"), wanted)]
 
 
 if __name__ == "__main__":
