@@ -72,8 +72,8 @@ def omitted(problem: Problem, timed: TimedPlan) -> dict[str, Fraction]:
     """Return the external events that a timed plan omits although it lasts until their times, in the order of the times."""
     events = (problem.times or Times()).events
     its = {slot.step.behavior for slot in timed.slots}
-    end = max((slot.end for slot in timed.slots if slot.step.behavior not in events), default=Fraction(0))
-    return {name: at for name, at in sorted(events.items(), key=lambda one: one[1]) if name not in its and at <= end}
+    missing = {name: at for name, at in events.items() if name not in its and at <= timed.makespan}
+    return dict(sorted(missing.items(), key=lambda one: one[1]))
 
 
 def validate_in_sequence(problem: Problem, plan: Plan) -> list[Fault]:

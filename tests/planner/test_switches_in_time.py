@@ -102,6 +102,16 @@ def test_the_steps_of_a_plan_wait_for_external_events_that_it_needs_not(
     assert timed.makespan == makespan
 
 
+@pytest.mark.parametrize(("seconds", "status"), [(3, Status.GAVE_UP), (7, Status.SOLVED)])
+def test_a_plan_that_ends_with_an_external_event_contains_all_earlier_events(
+    seconds: int, status: Status, tmp_path: Path
+) -> None:
+    goals = node("task", "Task", "", " ; c:goal :lit, :given") + node("lit", "ValueCondition", "a")
+    goals += node("given", "ValueCondition", "b2")
+    events = happening("E5", 5, "five", "b2"), happening("DARK", seconds, "dark", "a", OFF)
+    assert load(tmp_path, *events, goals).plan().outcome.status is status
+
+
 def test_a_soft_goal_that_an_external_event_undoes_is_unmet(tmp_path: Path) -> None:
     goals = node("task", "Task", "", " ; c:goal :done, :soft") + node("done", "ValueCondition", "b")
     soft = node("soft", "ValueCondition", "a2", " ; c:weight 3") + HEAD.splitlines()[-1].replace(":a.", ":a2.").replace(
