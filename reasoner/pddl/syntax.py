@@ -18,6 +18,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 
+from confab.reasoner.limits import checked
 from confab.reasoner.pddl.declarations import CHANGES, COMPARISONS, Action, Axiom, Pddl, Typed, either
 from confab.reasoner.pddl.durative import Durative, NotTimedError, duration_in, timed, whole
 from confab.reasoner.pddl.forms import distinct
@@ -151,7 +152,7 @@ class _Reader:
         for wanted in (":init", ":goal"):
             if wanted not in sections:
                 raise self.fail(form, f"the problem has no ({wanted} …)")
-        for item in sections[":init"].items[1:]:
+        for item in checked(sections[":init"].items[1:], f"reading {self.file}"):
             self.fact(item)
         if ":constraints" in sections:
             self.constraints(sections[":constraints"].items[1:])

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from itertools import chain
 from typing import TypeAlias
 
 import pyoxigraph as ox
@@ -17,6 +18,7 @@ import pyoxigraph as ox
 from confab.reasoner.amounts import Measure, bounds, written
 from confab.reasoner.condition_nodes import NodeWriter, Properties, decimal_text, finite, relation_properties
 from confab.reasoner.language import measures
+from confab.reasoner.limits import checked
 from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     FALSE,
@@ -73,7 +75,7 @@ def turtle(problem: Problem, title: str, description: str, labels: Said | None =
     """
     writer = _SceneWriter(problem, dict(labels or {}))
     header = HEADER.format(scene=problem.scene, title=_quoted(title), description=_quoted(description))
-    return header + "\n".join(writer.lines()) + "\n"
+    return header + "\n".join(checked(writer.lines(), "writing the scene")) + "\n"
 
 
 def _quoted(text: str) -> str:
@@ -334,7 +336,7 @@ class _SceneWriter:
         A fact is written as a statement of a value property if the property exists, and as a node otherwise.
         """
         number, fact = 0, self.unlike_others("fact")
-        for subject, prop, value, properties in (*self.values(), *self.tuples()):
+        for subject, prop, value, properties in chain(self.values(), self.tuples()):
             if prop:
                 yield f"{self.iri(subject)} {prop} {value} ."
                 continue
@@ -385,7 +387,8 @@ class _SceneWriter:
 
     def task(self) -> Iterator[str]:
         goals = [Fact(symbol, part) for symbol, value in self.problem.goal.items() for part in value.split(",")]
-        iris = [f":{self.unlike_others('goal')}{i}" for i in range(1, len(goals) + 1)]
+        name = self.unlike_others("goal")
+        iris = [f":{name}{i}" for i in range(1, len(goals) + 1)]
         goal = f" ; c:goal {', '.join(iris)}" if iris else ""
         yield f':task a owl:NamedIndividual, c:Task ; rdfs:label "task"@en{goal} .'
         for iri, fact in zip(iris, goals, strict=True):

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from confab.reasoner.limits import checked
+
 MOST_BYTES = 32 * 2**20
 TOKEN = re.compile(r"[()]|-(?=[A-Za-z])|[^\s();?]+|\?[^\s();?]*|;[^\n]*|\s+")
 """Pattern of a token. A variable begins at its ``?``, as in ``(aircraft?a)``. A type begins at its name, as in ``(?b -boat)``."""
@@ -44,7 +46,7 @@ def form_of(text: str, file: str) -> Form:
     stack: list[tuple[list[PddlWord | Form], int, int]] = []
     line, start = 1, 0
     done: Form | None = None
-    for match in TOKEN.finditer(text):
+    for match in checked(TOKEN.finditer(text), f"reading {file}"):
         token, column = match.group(), match.start() - start + 1
         if token == "(":
             if done is not None:

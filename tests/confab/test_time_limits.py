@@ -18,6 +18,7 @@ from confab.cli import COMMANDS, app
 from confab.commands.given import warn_of_errors
 from confab.commands.options import Seconds
 from confab.execution import Execution
+from confab.pddl_commands import import_pddl
 from confab.planner.hierarchical import planner as hierarchical
 from confab.planner.hierarchical.call import Call
 from confab.planner.hierarchical.shortening import shortened
@@ -78,6 +79,17 @@ def test_a_command_ends_by_its_time_limit(words: str, large: Path, tmp_path: Pat
     assert process_time() - begin < SLACK
     assert isinstance(done.exception, LimitError) or done.exit_code == GAVE_UP
     assert list(tmp_path.iterdir()) == [tmp_path / "plan.json"]
+
+
+def test_the_import_of_a_large_pddl_problem_ends_by_its_time_limit(tmp_path: Path) -> None:
+    domain, problem = tmp_path / "domain.pddl", tmp_path / "problem.pddl"
+    domain.write_text("(define (domain d) (:predicates (p ?x)) (:action a :parameters (?x) :effect (p ?x)))")
+    facts = "(p o) " * 300_000
+    problem.write_text(f"(define (problem e) (:domain d) (:objects o) (:init {facts}) (:goal (p o)))")
+    begin = process_time()
+    with confab.within(SOON), pytest.raises(OutOfTimeError):
+        import_pddl(domain, problem, tmp_path / "new.ttl")
+    assert process_time() - begin < SLACK
 
 
 @pytest.mark.parametrize(
