@@ -108,7 +108,9 @@ class ReadRecorder(LoggedState):
         return frozenset(key for key in self.reads if key[0] not in rules) if rules else frozenset(self.reads)
 
 
-def activities(problem: Problem, steps: Sequence[Step], events: Iterable[StepEvent]) -> list[Activity]:
+def activities(
+    problem: Problem, steps: Sequence[Step], events: Iterable[StepEvent], rules: BehaviorReader | None = None
+) -> list[Activity]:
     """Return the activities of steps that are executed in the order of events.
 
     Parameters
@@ -118,13 +120,15 @@ def activities(problem: Problem, steps: Sequence[Step], events: Iterable[StepEve
         Steps without sub-steps.
     events : iterable of StepEvent
         The events of each step: either the whole step, or the begin and later the end.
+    rules : BehaviorReader, optional
+        The compiled behaviours of the problem; by default, the behaviours are compiled.
 
     Raises
     ------
     InapplicableError
         A step isn't applicable at its position in the events.
     """
-    course = StepSimulation(problem, steps)
+    course = StepSimulation(problem, steps, rules)
     for number, moment in events:
         check("finding the order that the steps need")
         if moment is not EventKind.END:
@@ -142,9 +146,9 @@ def in_sequence(steps: Sequence[Step]) -> Iterator[StepEvent]:
 class StepSimulation:
     """The simulation of a sequence of steps on symbols."""
 
-    def __init__(self, problem: Problem, steps: Sequence[Step]) -> None:
+    def __init__(self, problem: Problem, steps: Sequence[Step], rules: BehaviorReader | None = None) -> None:
         self.problem, self.steps = problem, steps
-        self.rules = BehaviorReader(problem)
+        self.rules = rules or BehaviorReader(problem)
         self.facts = ReadRecorder(problem, self.rules)
         self.pieces: dict[str, Pieces] = {}
         self.resting = default_actors(problem)

@@ -20,7 +20,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from itertools import islice
+from itertools import islice, permutations
 from math import inf
 from random import Random
 from time import perf_counter
@@ -29,11 +29,11 @@ from typing import TypeAlias
 from confab.planner.hierarchical.agenda import Agenda
 from confab.planner.hierarchical.call import Call, Compiled, compiled
 from confab.planner.plan import Plan, Step, UnsolvableError, renumbered
-from confab.planner.timed.activities import InapplicableError
+from confab.planner.timed.activities import Activity, InapplicableError, activities, in_sequence
 from confab.planner.timed.listing import combinations
 from confab.planner.timed.network import earliest, network_of
-from confab.planner.timed.order import order_in_sequence
-from confab.planner.timed.pieces import default_actors
+from confab.planner.timed.order import order_of
+from confab.planner.timed.pieces import actors_of, default_actors
 from confab.planner.timed.schedules import turn_edges
 from confab.planner.validation import BehaviorReader, LoggedState, validate
 from confab.reasoner.limits import LimitError, check
@@ -43,7 +43,7 @@ from confab.reasoner.timing import timing_of
 
 MOST_CREWS = 64
 """Maximum number of crews."""
-MOST_WORK = 20_000_000
+MOST_WORK = 10_000_000
 """Maximum work of sharing; the unit is one operator in one state, about a microsecond."""
 PLANNING, SCHEDULING = 2_500, 60
 """Work of planning a stretch without its searches, and work of scheduling a primitive; the unit is one operator in one state."""
@@ -88,18 +88,24 @@ SharedTask: TypeAlias = "tuple[Aim, Crew]"
 class Crew:
     """A crew: a chosen individual for each class of actors, the barred actors `without`, and the barred steps.
 
-    A barred step is a behaviour with its arguments; no arguments bar all steps of the behaviour.
+    A barred step is a behaviour with its arguments; no arguments bar all steps of the behaviour. If the crew is `united`, as few
+    actors as possible take part in each step of the first level.
     """
 
     chosen: tuple[tuple[str, str], ...] = ()
     without: frozenset[str] = frozenset()
     barred: frozenset[Ground] = frozenset()
+    united: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Stretch:
+    """The steps of a task from the state `before` to the state `after`, with their activities as soon as a schedule needs them."""
+
     steps: tuple[Step, ...]
+    before: State
     after: State
+    activities: list[Activity] | None = None
 
 
 @dataclass
@@ -240,8 +246,19 @@ class _SharingSearch:
 
     @cached_property
     def crews(self) -> list[Crew]:
-        """The crews that the search may assign to tasks."""
-        return list(islice(crews_of(self.problem), MOST_CREWS))
+        """The crews that the search may assign to tasks; if a step of the plan has several actors, each crew may be united."""
+        crews, steps = list(islice(crews_of(self.problem), MOST_CREWS)), self.plan.steps
+        resting = default_actors(self.problem)
+        if any(len(self.actors(step, resting)) > 1 for step in steps):
+            return [replace(crew, united=united) for united in (False, True) for crew in crews]
+        return crews
+
+    def actors(self, step: Step, resting: frozenset[str]) -> list[str]:
+        """Return the actors of the primitives of a step."""
+        behaviors = self.problem.domain.behaviors
+        inside = [one for one in step.walk() if not one.steps]
+        its = (actors_of(self.problem, behaviors[one.behavior], one.arguments, resting) for one in inside)
+        return list(dict.fromkeys(actor for some in its for actor in some))
 
     @cached_property
     def last(self) -> dict[Symbol, int]:
@@ -276,7 +293,9 @@ class _SharingSearch:
             self.until = (perf_counter() + until) / 2
         self.limit(MOST_WORK // 2)
         with suppress(LimitError):
-            greedy = self.greedy()
+            for united in dict.fromkeys(crew.united for crew in self.crews):
+                other = self.greedy([crew for crew in self.crews if crew.united is united])
+                greedy = other if greedy is None or (other is not None and other.cost < greedy.cost) else greedy
         self.until = until
         self.limit(inf if self.shorten and self.until is not None else MOST_WORK)
         if self.best is None or (greedy is not None and greedy.cost < self.best.cost):
@@ -342,12 +361,12 @@ class _SharingSearch:
             upto = next((k for k, end in enumerate(ends) if end >= self.last.get(goal, ends[-1])), len(ends) - 1) + 1
             upto = len(ends) if goal == goals[-1] else max(upto, at)
             steps = renumbered(self.plan.steps[at:upto])
-            state, at = self.after(state, steps), upto
-            stretches.append(_Stretch(steps, state))
+            before, state, at = state, self.after(state, steps), upto
+            stretches.append(_Stretch(steps, before, state))
             self.known[(goal, Crew()), frozenset()] = [steps]
         return self.scheduled([(goal, Crew()) for goal in goals], stretches) if goals else None
 
-    def greedy(self) -> _Sequence | None:
+    def greedy(self, crews: Sequence[Crew]) -> _Sequence | None:
         """Return the greedy sequence of tasks: each goal is assigned to the crew that achieves the goal first.
 
         If no crew achieves a goal, the goal is tried again after the next goal. Return None if no crew achieves a remaining goal.
@@ -358,7 +377,7 @@ class _SharingSearch:
             tasks = [] if now is None else now.tasks
             found: list[_Sequence] = []
             for goal in waiting:
-                found = [one for crew in self.crews if (one := self.built([*tasks, (goal, crew)], now)) is not None]
+                found = [one for crew in crews if (one := self.built([*tasks, (goal, crew)], now)) is not None]
                 if found:
                     waiting.remove(goal)
                     break
@@ -426,6 +445,13 @@ class _SharingSearch:
         """
         early, aim = frozenset(one for one in aims[:-1] if not isinstance(one, Symbol)), aims[-1]
         key = frozenset(state.items()), frozenset(aims), aim, crew
+        if key not in self.stretches and crew.united:
+            apart = replace(crew, united=False)
+            base = self.stretch(state, aims, apart)
+            if base is not None and any(step.joined for step in base.steps):  # an actor can't leave a joint refinement
+                steps = self.planned(replace(self.problem, initial=state, goal=self.wanted(aims)), apart, aim)
+                base = None if steps is None else _Stretch(steps, state, self.after(state, steps))
+            self.stretches[key] = self.united(base, aims)
         if key not in self.stretches:
             problem = replace(self.problem, initial=state, goal=self.wanted(aims))
             known = self.known.setdefault(((aim, crew), early), [])
@@ -437,8 +463,83 @@ class _SharingSearch:
                 self.failed[aim, crew] += 1
             elif steps not in known:
                 known.append(steps)
-            self.stretches[key] = None if steps is None else _Stretch(steps, self.after(state, steps))
+            self.stretches[key] = None if steps is None else _Stretch(steps, state, self.after(state, steps))
         return self.stretches[key]
+
+    def united(self, stretch: _Stretch | None, aims: Sequence[Aim]) -> _Stretch | None:
+        """Return a stretch in which one actor of a first-level step takes over the primitives of another where this is valid."""
+        if stretch is None:
+            return None
+        steps, resting = stretch.steps, default_actors(self.problem)
+        problem = replace(self.problem, initial=stretch.before, goal=self.wanted(aims))
+        for number, step in enumerate(steps):
+            for giver, taker in permutations(self.actors(step, resting), 2):
+                now = steps[number]
+                if (
+                    giver in now.arguments
+                    or any(one.joined for one in now.walk())
+                    or not {giver, taker} <= set(self.actors(now, resting))
+                ):
+                    continue
+                self.spend(SCHEDULING * len(Plan(steps).primitives))
+                other = self.replayed(
+                    stretch.before, (*steps[:number], self.renamed(now, giver, taker), *steps[number + 1 :])
+                )
+                if other is not None and not validate(problem, Plan(other)):
+                    steps = other
+        return stretch if steps is stretch.steps else _Stretch(steps, stretch.before, self.after(stretch.before, steps))
+
+    def renamed(self, step: Step, old: str, new: str) -> Step:
+        """Return a step whose sub-steps name another individual."""
+
+        def other(one: Step) -> Step:
+            terms = tuple(new if term == old else term for term in one.arguments)
+            return replace(one, arguments=terms, steps=tuple(map(other, one.steps)))
+
+        return replace(step, steps=tuple(map(other, step.steps)))
+
+    def replayed(self, state: State, steps: Sequence[Step]) -> tuple[Step, ...] | None:
+        """Return first-level steps without the primitives that aren't applicable; a primitive may come later in its step.
+
+        Return None if no primitive of a step is applicable.
+        """
+        facts, found = LoggedState(self.problem, state, self.rules), list[Step]()
+        for step in steps:
+            if not step.steps:
+                done, left = [self.done(step, facts)], list[Step]()
+            else:
+                done, left = [], list(step.steps)
+            while left:
+                now = next(
+                    ((i, one) for i, child in enumerate(left) if (one := self.done(child, facts)) is not None), None
+                )
+                if now is None:
+                    break
+                del left[now[0]]
+                done.append(now[1])
+            inside = [one for one in done if one is not None]
+            if not inside:
+                return None
+            found.append(replace(step, steps=tuple(inside)) if step.steps else inside[0])
+        return renumbered(found)
+
+    def done(self, step: Step, facts: LoggedState) -> Step | None:
+        """Return a step with its applicable primitives and their present bindings, and change the facts; None if there are none."""
+        behavior = self.problem.domain.behaviors[step.behavior]
+        if not self.rules.fits(behavior, step.arguments):
+            return None
+        step = replace(step, id=self.problem.id_of(step.behavior, step.arguments))
+        if step.steps:
+            inside = tuple(one for child in step.steps if (one := self.done(child, facts)) is not None)
+            return replace(step, steps=inside) if inside else None
+        given = {p.name: argument for p, argument in zip(behavior.parameters, step.arguments, strict=True)}
+        its = self.rules.satisfied(behavior.preconditions, given, behavior.kinds, facts)
+        changes = None if its is None else self.rules.changes(behavior, step.arguments, facts)
+        if its is None or changes is None:
+            return None
+        for change in changes:
+            facts.put(*change)
+        return replace(step, bindings={name: its.get(f"?{name}", one) for name, one in step.bindings.items()})
 
     def wanted(self, aims: Sequence[Aim]) -> State:
         """Return the goals among the given aims, and the goals that the plan doesn't change, with their values."""
@@ -520,15 +621,24 @@ class _SharingSearch:
     def _open(self) -> frozenset[Symbol]:
         return frozenset(self.goals)
 
+    def activities(self, stretch: _Stretch) -> list[Activity]:
+        """Return the activities of a stretch, which depend only on the state before it."""
+        if stretch.activities is None:
+            problem, steps = replace(self.problem, initial=stretch.before), Plan(stretch.steps).primitives
+            stretch.activities = activities(problem, steps, in_sequence(steps), self.rules)
+        return stretch.activities
+
     def scheduled(self, tasks: list[SharedTask], stretches: list[_Stretch]) -> _Sequence | None:
         """Return the sequence of tasks with the earliest schedule of their steps in the given order."""
         plan = Plan(renumbered(step for one in stretches for step in one.steps))
         steps = plan.primitives
         self.spend(SCHEDULING * len(steps))
         try:
-            order = order_in_sequence(self.problem, steps)
+            its = [one for stretch in stretches for one in self.activities(stretch)]
         except InapplicableError:
             return None
+        its = [replace(one, step=step) for one, step in zip(its, steps, strict=True)]
+        order = order_of(self.problem, its, in_sequence(steps))
         network = network_of(order)
         begins = earliest(network, turn_edges(order, order.turns))
         if begins is None:

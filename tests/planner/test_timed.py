@@ -17,6 +17,7 @@ from confab.planner.timed.call import Timed, best_in_time, in_time
 from confab.planner.timed.measuring import measured, with_durations
 from confab.planner.timed.plan import Slot, TimedPlan, schedule_of
 from confab.planner.timed.validation import validate_timed
+from confab.planner.validation import validate
 from confab.reasoner.generate import write_scene
 from confab.reasoner.graph.knowledge import load
 from confab.reasoner.limits import within
@@ -481,6 +482,77 @@ def test_the_bound_of_any_plan_proves_that_no_plan_is_shorter(tmp_path: Path) ->
         ["b1 AT s1", "b2 AT s1", "b3 AT s2", "b4 AT s2"], minimise="makespan"
     )
     assert "; no plan is shorter; by" in str(result)
+
+
+PAINT_SHOP = r'''
+@prefix : <https://example.org/paint#> . @prefix c: <https://w3id.org/confab/core#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> . @prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
+<https://example.org/paint> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> ; c:symbolicOnly true .
+xsd:dayTimeDuration a rdfs:Datatype .
+:Booth a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object, :AT ; c:hasSituationType :FAN .
+:Robot a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object ; c:hasSituationType :AT .
+:Blaster a owl:Class, owl:NamedIndividual ; rdfs:subClassOf :Robot .
+:Sprayer a owl:Class, owl:NamedIndividual ; rdfs:subClassOf :Robot .
+:Part a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object ; c:hasSituationType :BLASTED, :PAINTED .
+:BLASTED a owl:Class, owl:NamedIndividual, c:SituationType . :PAINTED a owl:Class, owl:NamedIndividual, c:SituationType .
+:FAN a owl:Class, owl:NamedIndividual, c:SituationType ; c:fromLevel 2 ; c:restValue c:false .
+:AT a owl:Class, owl:NamedIndividual, c:SituationType ; c:valueProperty :at ; c:fromLevel 2 .
+:at a owl:ObjectProperty, owl:FunctionalProperty, owl:NamedIndividual ; rdfs:domain :Robot ; rdfs:range :AT .
+:standsIn a owl:ObjectProperty, owl:NamedIndividual, c:Relation ; rdfs:domain :Part ; rdfs:range :Booth .
+:L1_BLAST a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 1 ; c:update """
+  INSERT { ?part :BLASTED true } WHERE { ?part a :Part ; :BLASTED false }""" .
+:L1_PAINT a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 2 ; c:update """
+  INSERT { ?part :PAINTED true } WHERE { ?part a :Part ; :BLASTED true }""" .
+:DRIVE a owl:NamedIndividual, c:Behavior ; c:level 2 ; c:index 1 ; c:actor :DRIVE.robot ;
+  c:duration "PT1M"^^xsd:dayTimeDuration ; c:update """
+  DELETE { ?robot :at ?from } INSERT { ?robot :at ?to }
+  WHERE { ?robot a :Robot . ?to a :Booth . ?robot :at ?from FILTER(?from != ?to) }""" .
+:FAN_ON a owl:NamedIndividual, c:Behavior ; c:level 2 ; c:index 2 ; c:actor :FAN_ON.robot ;
+  c:duration "PT1M"^^xsd:dayTimeDuration ; c:update """
+  INSERT { ?booth :FAN true } WHERE { ?robot a :Robot . ?booth a :Booth ; :FAN false . ?robot :at ?booth }""" .
+:FAN_OFF a owl:NamedIndividual, c:Behavior ; c:level 2 ; c:index 3 ; c:actor :FAN_OFF.robot ;
+  c:duration "PT1M"^^xsd:dayTimeDuration ; c:update """
+  INSERT { ?booth :FAN false } WHERE { ?robot a :Robot . ?booth a :Booth ; :FAN true . ?robot :at ?booth }""" .
+:BLAST a owl:NamedIndividual, c:Behavior ; c:level 2 ; c:index 4 ; c:actor :BLAST.robot ;
+  c:duration "PT10M"^^xsd:dayTimeDuration ; c:update """
+  INSERT { ?part :BLASTED true }
+  WHERE { ?robot a :Blaster . ?part a :Part ; :standsIn ?booth . ?booth a :Booth ; :FAN true . ?robot :at ?booth }""" .
+:PAINT a owl:NamedIndividual, c:Behavior ; c:level 2 ; c:index 5 ; c:actor :PAINT.robot ;
+  c:duration "PT10M"^^xsd:dayTimeDuration ; c:update """
+  INSERT { ?part :PAINTED true }
+  WHERE { ?robot a :Sprayer . ?part a :Part ; :BLASTED true ; :standsIn ?booth .
+    ?booth a :Booth ; :FAN true . ?robot :at ?booth }""" .
+:booth1 a owl:NamedIndividual, :Booth ; c:index 1 .
+:booth2 a owl:NamedIndividual, :Booth ; c:index 2 .
+:booth3 a owl:NamedIndividual, :Booth ; c:index 3 .
+:bob a owl:NamedIndividual, :Blaster ; c:index 4 ; :at :booth3 .
+:sue a owl:NamedIndividual, :Sprayer ; c:index 5 ; :at :booth3 .
+:hull a owl:NamedIndividual, :Part ; c:index 6 ; :standsIn :booth1 .
+:rudder a owl:NamedIndividual, :Part ; c:index 7 ; :standsIn :booth2 .
+[ a owl:AllDifferent ; owl:distinctMembers ( :bob :booth1 :booth2 :booth3 :hull :rudder :sue ) ] .
+:both a owl:NamedIndividual, c:Task ; c:goal :both.hull, :both.rudder .
+:both.rudder a owl:NamedIndividual, c:ValueCondition ; c:about :rudder ; c:situationType :PAINTED ;
+  c:by "PT1440S"^^xsd:dayTimeDuration .
+:both.hull a owl:NamedIndividual, c:ValueCondition ; c:about :hull ; c:situationType :PAINTED ;
+  c:by "PT2220S"^^xsd:dayTimeDuration .
+'''
+"""Bob blasts and sue paints two parts in two booths; any robot in a booth switches the fan, which the other steps there need."""
+
+
+def test_an_actor_takes_over_the_supporting_steps_of_another_actor_that_is_needed_elsewhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("confab.planner.timed.sharing.MOST_BARREN", 0)
+    monkeypatch.setattr("confab.planner.timed.sharing.BARREN_ROUNDS", 0)
+    (tmp_path / "paint.ttl").write_text(PAINT_SHOP)
+    result = confab.load(tmp_path / "paint.ttl").plan()
+    assert result.plan is not None
+    fans = [step for step in result.plan.primitives if step.behavior == "FAN_ON"]
+    assert {step.arguments for step in fans} == {
+        (robot, booth) for robot in ("bob", "sue") for booth in ("booth1", "booth2")
+    }
+    assert validate(read(load(tmp_path / "paint.ttl")).problem, result.plan) == []
 
 
 def test_with_a_time_limit_the_goals_are_shared_in_more_ways() -> None:
