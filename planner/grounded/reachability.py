@@ -111,6 +111,7 @@ class Reached:
         for symbol, value in self.initial.items():
             yield from (*symbol.arguments, value)
         for tuples in self.problem.relations.values():
+            self.check_time()
             for arguments in sorted(tuples):
                 yield from arguments
         for schema in self.schemas:
@@ -140,6 +141,7 @@ class Reached:
                 self.symbols[name].add(self.tables["situation", name].rows[:, :-1])
 
     def _put(self, key: tuple[str, str], arity: int, rows: Sequence[tuple[str, ...]]) -> None:
+        self.check_time()
         number = self.number
         table = self.tables[key] = JoinTable(arity, self.radix)
         flat = [number[name] for row in rows for name in row]

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain
 
 from confab.planner.transitions import Key
+from confab.reasoner.limits import checked
 from confab.reasoner.problem import Problem
 
 ENDS = 8
@@ -32,7 +33,7 @@ class SymmetryClasses:
                 marks.setdefault(member, []).append(kind)
         for relation in sorted(problem.relations):
             tuples = problem.relations[relation]
-            for row in sorted(tuples):
+            for row in checked(sorted(tuples), "compiling the behaviours"):
                 for position, individual in enumerate(row):
                     if individual in marks:
                         marks[individual].append((relation, position, row[:position] + row[position + 1 :]))

@@ -1,5 +1,7 @@
 """Every search and every episode ends within its time limit, with the right answer if there is one."""
 
+from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from time import perf_counter, process_time
@@ -12,10 +14,13 @@ from confab.planner.acting import executive
 from confab.planner.acting.symbolic_world import SymbolicWorld
 from confab.planner.generated import code
 from confab.planner.grounded.joins import JoinTable
+from confab.planner.grounded.reachability import Reached
+from confab.planner.hierarchical.call import compiled
 from confab.planner.hierarchical.unsolvability import impossible
 from confab.planner.plan import Limits, Outcome, Plan, Status
 from confab.planner.solve import Mode
 from confab.reasoner.limits import OutOfTimeError, check, current, within
+from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import TRUE, RelationCondition, SituationType
 from worlds.writing import becomes, behavior, has, world
 
@@ -97,3 +102,14 @@ def test_a_compilation_that_would_pass_the_deadline_is_not_begun() -> None:
     with within(0.1), pytest.raises(OutOfTimeError, match=r"gave up after 0\.1 s while compiling"):
         code("x = 1\n" * 200_000)
     assert perf_counter() - begin < 0.1
+
+
+@pytest.mark.parametrize(
+    "work", [compiled, lambda problem: Reached(problem, problem.domain.levels[-1], problem.initial, 10**6, None)]
+)
+def test_compiling_and_grounding_many_static_facts_end_by_the_deadline(work: Callable[[Problem], object]) -> None:
+    problem = confab.load("two-cups").problem
+    many = frozenset((str(i), str(j)) for i in range(100) for j in range(100))
+    problem = replace(problem, relations={**problem.relations, "many": many})
+    with within(0.0), pytest.raises(OutOfTimeError):
+        work(problem)
