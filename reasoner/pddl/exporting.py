@@ -10,9 +10,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 from confab.reasoner.amounts import written
 from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.limits import checked
 from confab.reasoner.names import local_name
 from confab.reasoner.pddl.formulas import (
     TRUE,
@@ -41,6 +43,7 @@ from confab.reasoner.pddl.vocabulary import PddlNames
 from confab.reasoner.problem import Problem
 from confab.reasoner.timing import only_during
 
+EXPORTING = "exporting the facts"
 LINE = "\n    "
 
 
@@ -136,7 +139,7 @@ class _Export:
                 ways = [(symbol, rest), *((goal, problem.goal[goal]) for goal in soft)]
                 wanted.append(either(self.lowering.goal(*way) for way in ways))
         self.goal = both([*wanted, *self.lowering.within_bounds(ActionScope({}))])
-        self.facts = [*self.lowering.kept.facts(), *self.words.facts()]
+        self.facts = [*checked(chain(self.lowering.kept.facts(), self.words.facts()), EXPORTING)]
         self.formulas = [*(action.needs for action in self.actions.values()), *(holds for _, _, holds in self.derived)]
         self.changes = [change for action in self.actions.values() for change in action.changes]
         self.costs = any(action.cost != 1 for action in self.actions.values()) or bool(self.preferences)
@@ -232,7 +235,7 @@ class _Export:
     def problem_text(self, domain: str, objects: Sequence[str]) -> str:
         """Return the text of the PDDL problem."""
         facts = ["(= (total-cost) 0)"] * self.costs
-        for fact in dict.fromkeys(self.facts):
+        for fact in checked(dict.fromkeys(self.facts), EXPORTING):
             if isinstance(fact, Atom):
                 facts.append(formula_text(fact))
                 continue

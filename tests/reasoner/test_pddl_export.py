@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+import confab
 from confab.pddl_commands import import_pddl
 from confab.planner.grounded.best_first import plan_level
 from confab.planner.plan import Status
@@ -16,6 +17,7 @@ from confab.reasoner.aggregates.dependencies import unfolded
 from confab.reasoner.aggregates.totals import with_totals
 from confab.reasoner.amounts import Amount, Quantity
 from confab.reasoner.graph.knowledge import KnowledgeError
+from confab.reasoner.limits import OutOfTimeError
 from confab.reasoner.pddl.exporting import to_pddl
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse, parse_files
@@ -316,3 +318,9 @@ def test_names_that_pddl_can_not_distinguish_or_read_are_changed(names: Callable
     exported = to_pddl(problem)
     assert set(exported.objects.values()) == {names(name) for name in "abmno"}
     assert least(round_trip(problem)) == 2.0
+
+
+def test_an_export_ends_by_the_deadline() -> None:
+    problem = confab.load("two-cups").problem
+    with confab.within(0.0), pytest.raises(OutOfTimeError, match="exporting the facts"):
+        to_pddl(problem)
