@@ -74,7 +74,12 @@ def test_the_quick_check_before_planning_finds_each_error_of_the_rules(rule: str
     assert errors == [finding.rule for finding in validate([file]) if finding.serious]
 
 
-OUTSIDE = {"variable-outside-range", "relation-outside-domain", "relation-outside-range"}
+OUTSIDE = {
+    "variable-outside-range",
+    "relation-outside-domain",
+    "relation-outside-range",
+    "condition-without-situation-type",
+}
 
 
 @pytest.mark.parametrize(
@@ -94,7 +99,9 @@ def test_a_term_can_be_any_individual_in_both_its_class_and_the_required_class(
     domain = tmp_path / "washing.ttl"
     near = """
     :near a owl:ObjectProperty, owl:NamedIndividual, c:Relation ; rdfs:domain :Place ; rdfs:range :Place .
-    :B1_WASH c:precondition :B1_WASH.near .
+    :BUSY a owl:NamedIndividual, c:SituationType . :Place c:hasSituationType :BUSY .
+    :B1_WASH c:precondition :B1_WASH.near, :B1_WASH.busy .
+    :B1_WASH.busy a owl:NamedIndividual, c:ValueCondition ; c:about :B1_WASH.where ; c:situationType :BUSY .
     :B1_WASH.near a owl:NamedIndividual, c:RelationCondition ; c:relation :near ; c:about :B1_WASH.where ; c:value :B1_WASH.where .
     """
     text = domain.read_text(encoding="utf-8").replace("c:Variable ; c:termType :Place", "c:Variable ; c:termType :Item")
