@@ -70,7 +70,7 @@ KEPT, KEPT_IN_TIME = 0.1, 0.3
 """The shares of the time limit that choosing among soft goals leaves: by default, and for a schedule of the chosen goals."""
 SHORTENING = 0.7
 """The share of the remaining time in which a plan with a schedule is shortened; the rest is for the new schedule."""
-CHOICE_WORK = 1_000_000
+CHOICE_WORK = 300_000
 """Maximum work of the search of a plan for one choice of soft goals.
 
 After more work for another choice, the maximum is twice that work.
@@ -330,7 +330,7 @@ def choose_and_search(task: PlanningTask, problem: Problem) -> tuple[Problem, Ou
         return in_its_times(choice, found)
 
     def shorten(choice: Problem, found: Outcome, briefly: bool) -> Outcome:
-        how = comparing(choice)._replace(shortening="brief") if briefly else Searching(mode)
+        how = comparing(choice)._replace(shortening="compared") if briefly else Searching(mode)
         return in_its_times(choice, counted(search(task, choice, how._replace(first=found))))
 
     def extended(choice: Problem, found: Outcome) -> Outcome:

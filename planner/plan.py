@@ -403,7 +403,7 @@ class Outcome:
         return frozenset(one.fact.symbol for one in self.forgone)
 
 
-Shortening = Literal["none", "brief", "once", "repeated"]
+Shortening = Literal["none", "brief", "compared", "once", "repeated"]
 """The work for a shorter plan: see `Limits`."""
 
 
@@ -417,8 +417,9 @@ class Limits:
     separately the final search for all goals together. `work` limits searches in grounded levels and parts of levels until a plan
     is found. The unit of `work` is states times operators, about a microsecond each. `shortening` is the work for a shorter plan.
     With "none", there is no round; with "once", there is one round. With "brief", there is one round with little work, or no round
-    if `seconds` is given. With "repeated", rounds follow one another until the second half of them has saved nothing, or until
-    `seconds` have passed.
+    if `seconds` is given. With "compared", there is always one round with little work, after windows of the lowest level were
+    replaced. With "repeated", rounds follow one another until the second half of them has saved nothing, or until `seconds` have
+    passed.
     Shortening keeps only plans that `accepts` allows.
     """
 

@@ -6,10 +6,12 @@ a small total cost.
 
 First, `preferred` plans for the hard goals alone. If there is no plan for the hard goals, the task has no plan, unless a soft goal
 replaces a rest value. Second, it plans for all soft goals together. From either choice, it adds or drops one soft goal at a time,
-the heaviest first, until no such change makes the choice cheaper. These plans only compare choices, so they needn't be shortened.
-If `shorten` is given, `preferred` then shortens the plans of the few cheapest choices with little work, and in the end the plan of
-the best of them with the full work. If `prove` is given, it computes a lower bound for the choice and for all choices that could be
-cheaper. Choices with a smaller sum of unmet weights come first.
+the heaviest first, until no such change makes the choice cheaper. If it finds no plan for all soft goals, it adds each goal, the
+heaviest first, for which it finds a plan. These plans only compare choices, so they needn't be shortened. If `shorten` is given,
+`preferred` then shortens the plans of the few cheapest choices and of the choice with the most goals with little work, since a plan
+for many goals may become much cheaper. In the end, it shortens the plan of the best of them with the full work. If `prove` is
+given, it computes a lower bound for the choice and for all choices that could be cheaper. Choices with a smaller sum of unmet
+weights come first.
 
 If `extend` is given, a choice for which the search gave up gets the plan of a choice with fewer goals, extended by steps for the
 other goals. Finally, the plan of the result is extended by steps for each unmet soft goal whose weight exceeds the cost of these
@@ -41,7 +43,7 @@ Goals: TypeAlias = frozenset[Symbol]
 MOST_CHOICES = 200
 """Maximum number of choices for which a separate plan is searched in order to prove that no other choice is cheaper."""
 SHORTENED = 3
-"""Maximum number of choices that are compared by plans shortened with little work."""
+"""Maximum number of choices that are compared by plans shortened with little work, besides the choice with the most goals."""
 PRECISION = 1_000_000
 """Maximum denominator of the stated cost of meeting a soft goal; this cost is rounded, since costs are floating-point numbers."""
 
@@ -78,16 +80,19 @@ def preferred(
         found = choices.outcome(nothing)
         certified = not choices.away or choices.excluded()
         return choices.task(nothing), found if certified else replace(found, status=Status.GAVE_UP, certificate=None)
-    for start in (everything, first):
-        if choices.total(start) is not None:
-            choices.settle(start)
+    if choices.total(everything) is not None:
+        most = everything
+        choices.settle(most)
+    else:
+        most = choices.grown(first)
+    choices.settle(first)
     best, *others = choices.compared()
     if prove is not None:
         best, least = choices.cheapest(best)
         return choices.result(best, choices.outcome(best), least)
     if shorten is None:
         return choices.result(best, choices.outcome(best))
-    best = choices.shortened([best, *others[: SHORTENED - 1]], shorten)
+    best = choices.shortened([*dict.fromkeys([best, *others[: SHORTENED - 1], most])], shorten)
     return choices.result(best, choices.briefly[best], shorten=shorten)
 
 
@@ -237,6 +242,13 @@ class _SoftGoalChoices:
                 other = None if self.ended else self.total(kept ^ {symbol})
                 if other is not None and (total is None or other < total):
                     kept, total = kept ^ {symbol}, other
+
+    def grown(self, kept: Goals) -> Goals:
+        """Return a choice with as many further goals as possible: each goal, the heaviest first, for which a plan is found."""
+        for symbol in reversed(self.by_weight()):
+            if symbol not in kept and not self.ended and self.total(kept | {symbol}) is not None:
+                kept |= {symbol}
+        return kept
 
     def compared(self) -> list[Goals]:
         """Return the choices with different plans, sorted by their total costs."""

@@ -43,6 +43,8 @@ LEAST_EFFORT = 600_000
 
 Because of this minimum, the planner also shortens plans that were found with little effort.
 """
+COMPARED = 2
+"""Work of replacing windows in a plan that is compared with plans for other goals, in units of the effort of finding the plan."""
 LEAST_ROUNDS = 5
 """Minimum number of rounds of repeated shortening; the first rounds may be too short to improve a plan."""
 DOING, BEGINNING = 20, 1_000
@@ -68,14 +70,18 @@ def shorten(call: Call, improve: int, leave_levels: bool, advised: Callable[[Cal
 
     By default, there is one round. Repeated shortening has at least `LEAST_ROUNDS` rounds; if round n was the last round that made
     the plan cheaper, there are at most 2 n rounds. A brief call has one round with little work, or no round if the call has a time
-    limit.
+    limit. A plan that is compared with plans for other goals has one round with little work; before that, windows of the lowest
+    level are replaced, with more work than the effort of finding the plan.
     """
-    if prices(call) > 1 and call.bound is None:
+    how = call.space.shortening
+    if how in {"once", "repeated"} and prices(call) > 1 and call.bound is None:
         call.bound = lower_bound(call)
-    improve = 1 if call.space.shortening == "brief" else improve
+    improve = 1 if how in {"brief", "compared"} else improve
     work, random = max(call.space.effort, LEAST_EFFORT) * improve // (2 * DEFAULT_WORK), Random(0)
+    if how == "compared" and leave_levels and COMPARED * call.space.effort > work:
+        windowed(call, call.program.levels[-1], COMPARED * call.space.effort)
     rounds = useful = 0
-    most = {"none": 0, "brief": int(call.space.deadline is None), "once": 1, "repeated": inf}[call.space.shortening]
+    most = {"none": 0, "brief": int(call.space.deadline is None), "compared": 1, "once": 1, "repeated": inf}[how]
     while rounds < min(most, max(LEAST_ROUNDS, 2 * useful)):
         before, begin = cost(call), perf_counter()
         shorten_once(call, work, leave_levels, advised, random)

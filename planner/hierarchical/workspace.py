@@ -52,7 +52,7 @@ class Workspace:
     most_work : float
         Maximum work in scopes (number of states times number of operators); `LimitError` is raised above this work.
     shortening : str
-        Work for a shorter plan: "none", "brief", "once" or "repeated" (`Limits.shortening`).
+        Work for a shorter plan: "none", "brief", "compared", "once" or "repeated" (`Limits.shortening`).
     meanwhile : function
         Function that looks for a proof of unsolvability or for a plan of the lowest level; it is called each time that the effort
         has doubled.

@@ -164,6 +164,26 @@ def test_the_choice_of_soft_goals_is_kept_if_its_proof_gives_up() -> None:
     assert not unproved.proved
 
 
+def test_goals_that_pay_only_together_are_met_even_if_no_plan_for_all_goals_is_found() -> None:
+    problem = confab.load("wishes-small").problem
+    stock = next(symbol for symbol in problem.goal if symbol.situation == "STOCK")
+    weights = {symbol: Fraction(1 if symbol == stock else 13) for symbol in problem.goal}
+
+    def search(task: Problem) -> Outcome:
+        return Outcome(Status.GAVE_UP) if stock in task.goal else default(task)
+
+    _, outcome = preferred(replace(problem, weights=weights), search)
+    assert [one.fact.symbol for one in outcome.forgone] == [stock]
+
+
+def test_plans_that_are_compared_are_shortened_within_a_time_limit_too() -> None:
+    problem = confab.load("wishes-small").problem
+    task = problem.only([symbol for symbol in problem.weights if symbol.situation == "STOCK"])
+    plans = [solve(Request(task, limits=Limits(seconds=60.0, shortening=how))).plan for how in ("none", "compared")]
+    longer, shorter = (cost_of(task, plan) for plan in plans if plan is not None)
+    assert shorter < longer
+
+
 def test_an_unmet_goal_states_whether_the_time_ended_or_the_search_found_no_plan() -> None:
     problem = confab.load("wishes-small").problem
 
