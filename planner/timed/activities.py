@@ -99,8 +99,18 @@ class ReadRecorder(LoggedState):
     def begin(self) -> None:
         """Discard the recorded accesses."""
         self.reads = {}
+        self._totals.clear()  # so that the facts from which totals follow are read, too
         if self.problem.domain.rules:  # cached derived facts would be read without their reasons
             self._definitions.forget()
+
+    def state(self) -> dict[Symbol, str]:
+        """Return the stated facts of the current state, with the totals that follow from them."""
+        found = super().state()
+        return found | {
+            symbol: self.value(symbol.situation, symbol.arguments) or ""
+            for symbol in found
+            if symbol.situation in self.rules.totals
+        }
 
     def noted(self) -> frozenset[ReadAccess]:
         """Return the facts that were read."""

@@ -18,6 +18,8 @@ from fractions import Fraction
 from confab.planner.checked_amounts import worth
 from confab.planner.checked_conditions import Arguments, ConditionReader
 from confab.planner.validation import BehaviorReader, LoggedState
+from confab.reasoner.amounts import Quantity
+from confab.reasoner.derivation import deciding
 from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     AmountEffect,
@@ -54,12 +56,12 @@ class Pieces:
 
 
 def pieces_of(problem: Problem, behavior: Behavior) -> Pieces:
-    """Return the pieces of a behaviour."""
-    timing = timing_of(behavior)
+    """Return the pieces of a behaviour, without effects on totals that the state alone determines."""
+    timing, free = timing_of(behavior), free_totals(problem)
     fixed, own = fixed_at_begin(behavior), with_fixed(behavior)
 
     def piece(name: str, conditions: Sequence[Condition], effects: Sequence[Effect]) -> Behavior:
-        spread = on_each(effects, problem.classes)
+        spread = on_each([one for one in effects if one.situation not in free], problem.classes)
         return replace(
             own,
             name=f"{behavior.name}@{name}",
@@ -75,6 +77,16 @@ def pieces_of(problem: Problem, behavior: Behavior) -> Pieces:
     )
     held = piece("held", timing.asked(Span.THROUGHOUT), ())
     return Pieces(behavior, fixed, timing, begin, middle, end, held)
+
+
+def free_totals(problem: Problem) -> frozenset[str]:
+    """Return the totals without bounds that decide no goal with a deadline; a step that reads a total reads the facts that determine it."""
+    deadlines = problem.times.deadlines if problem.times is not None else ()
+    timed = {deciding(problem, goal).situation for goal in deadlines if goal in problem.goal}
+    kinds, every = problem.domain.situations, problem.domain.aggregates.items()
+    return frozenset(
+        name for name, one in every if one.kept and name not in timed and kinds[name].quantity in (None, Quantity())
+    )
 
 
 def terms_at(rules: BehaviorReader, pieces: Pieces, arguments: Arguments, facts: LoggedState) -> Arguments:

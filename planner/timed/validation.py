@@ -111,6 +111,7 @@ class _Watched(LoggedState):
 
     def clear(self) -> None:
         self.cells, self.values = set(), set()
+        self._totals.clear()  # so that the facts from which totals follow are read, too
         if self.problem.domain.rules:
             self._definitions.forget()
 

@@ -7,15 +7,19 @@ from pathlib import Path
 import pytest
 
 import confab
+from confab.planner.acting.dispatching import Concurrency
+from confab.planner.acting.episode import End
+from confab.planner.acting.executive import act
+from confab.planner.acting.symbolic_world import SymbolicWorld
 from confab.planner.certificate_checks import refusal
 from confab.planner.certificates import Certificate
 from confab.planner.certifying import certify
-from confab.planner.plan import Limits, Outcome, Status
+from confab.planner.plan import Limits, Outcome, Plan, Status, Step
 from confab.planner.solve import Request, solve
 from confab.planner.timed.call import best_in_time
-from confab.planner.timed.plan import TimedPlan, schedule_of
+from confab.planner.timed.plan import Slot, TimedPlan, schedule_of
 from confab.planner.timed.validation import validate_in_sequence, validate_timed
-from confab.planner.validation import validate
+from confab.planner.validation import Fault, validate
 from confab.reasoner.aggregates.compiling import compiled
 from confab.reasoner.aggregates.totals import with_totals
 from confab.reasoner.amounts import Amount, Quantity
@@ -475,6 +479,57 @@ def test_a_condition_follows_an_effect_at_the_start_that_has_a_condition(span: S
     assert [step.behavior for step in outcome.plan.primitives] == ["W"]
     assert validate(task(FALSE), outcome.plan)
     assert solve(Request(task(FALSE), limits=Limits(seconds=10.0))).status is Status.UNSOLVABLE
+
+
+@pytest.mark.parametrize(("most", "makespan"), [(None, 2), (Fraction(3), 4)])
+def test_steps_that_change_a_total_without_a_bound_overlap_and_the_total_follows(
+    most: Fraction | None, makespan: int
+) -> None:
+    problem = lit("?t", most)
+    outcome = solve(Request(problem, limits=Limits(seconds=10.0)))
+    assert outcome.plan is not None
+    timed = best_in_time(problem, outcome.plan).plan
+    assert timed is not None
+    assert timed.makespan == makespan
+    world = SymbolicWorld(problem)
+    assert act(problem, world, outcome.plan, together=Concurrency(timed)).status is End.REACHED
+    assert world.seconds == makespan
+    assert world.observe()[Symbol("MANY", ())] == "2"
+
+
+def test_no_step_reads_a_total_while_another_step_changes_it() -> None:
+    looks = replace(
+        behavior("LOOK", 1, "", [Comparison(Amount("MANY", ()), ">=", Fraction(1))], []), timing=Timing(Fraction(1))
+    )
+    looks = replace(looks, timing=Timing(Fraction(1), (), ((Span.THROUGHOUT, looks.preconditions[0]),)))
+    problem = lit("?t", None)
+    problem = replace(problem, domain=replace(problem.domain, behaviors={**problem.domain.behaviors, "LOOK": looks}))
+    its = (("W", ("t",)), ("LOOK", ()), ("W", ("u",)))
+    steps = [Step((n,), problem.id_of(*one), 1, *one) for n, one in enumerate(its)]
+
+    def faults(*begins: int) -> list[Fault]:
+        slots = (
+            Slot(step, Fraction(b), Fraction(b + (1 if step.behavior == "LOOK" else 2)))
+            for step, b in zip(steps, begins, strict=True)
+        )
+        return validate_timed(problem, TimedPlan(Plan(tuple(steps)), tuple(slots)))
+
+    assert not faults(0, 2, 3)
+    assert faults(0, 2, 1)
+
+
+def lit(term: str, most: Fraction | None) -> Problem:
+    """Return a task to light two lamps in 2 s each; MANY is the number of lit lamps, which may have a maximum."""
+    made = ((Span.THROUGHOUT, becomes("G", term, TRUE)),)
+    one = replace(behavior("W", 1, f"{term}:T", [], [made[0][1]]), timing=Timing(Fraction(2), (term,), (), made))
+    kinds = [
+        SituationType("G", ("T",), "Truth", boolean=True),
+        SituationType("MANY", (), "MANY", quantity=Quantity(most=most)),
+    ]
+    problem = world(kinds, [one], {"T": ("t", "u")}, {}, {"G t": TRUE, "G u": TRUE})
+    count = Aggregate("MANY", "count", Fraction(1), (), (Parameter("?x", "T"),), (has("G", "?x", TRUE),))
+    domain = compiled(replace(problem.domain, aggregates={"MANY": count}), problem.classes)
+    return replace(problem, domain=domain, initial=with_totals(domain, problem.classes, {}, problem.initial))
 
 
 def counting(problem: Problem, level: int) -> Problem:
