@@ -250,7 +250,7 @@ def _with_events(
 ) -> Plan | None:
     """Return the plan with missing external events, or None if no place of an event has a schedule.
 
-    Each event follows all steps of the plan that begin before the event. If the steps have no schedule then, the last of these
+    Each event follows all steps of the plan that don't begin after the event. If the steps have no schedule then, the last of these
     steps wait for the event: as few as possible, and at most `MOST_PLACES`. An event without such a place comes immediately before
     the next event.
     """
@@ -261,7 +261,7 @@ def _with_events(
         waiting.append(Step((), problem.id_of(name, ()), problem.domain.behaviors[name].level, name, ()))
         asked = replace(problem, times=replace(times, events={n: t for n, t in times.events.items() if n in happening}))
         begin, steps = {slot.step.path: slot.begin for slot in now.slots}, now.plan.steps
-        begun = (i for i, step in enumerate(steps, 1) if any(begin.get(one.path, at) < at for one in step.walk()))
+        begun = (i for i, step in enumerate(steps, 1) if any(begin.get(one.path, inf) <= at for one in step.walk()))
         last = max(begun, default=0)
         for place in range(last, max(last - MOST_PLACES, 0) - 1, -1):
             plan = replace(now.plan, steps=renumbered((*steps[:place], *waiting, *steps[place:])))

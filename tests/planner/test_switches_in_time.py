@@ -102,6 +102,18 @@ def test_the_steps_of_a_plan_wait_for_external_events_that_it_needs_not(
     assert timed.makespan == makespan
 
 
+@pytest.mark.parametrize("given", ["", OFF])
+def test_external_events_at_the_same_instant_have_either_order(given: str, tmp_path: Path) -> None:
+    """The event that the goal needs is possible before the other event, or after it."""
+    first = happening("E1", 5, "one", "b").replace("c:postcondition", "c:precondition :asked ; c:postcondition")
+    other = happening("E2", 5, "two", "a", given).replace("index 7", "index 8")
+    dark = HEAD if given else HEAD[: HEAD.index(":a.on")]
+    (tmp_path / "switches.ttl").write_text(dark + first + other + node("asked", "ValueCondition", "a") + DONE, "utf-8")
+    timed = confab.load(tmp_path / "switches.ttl").plan().timed
+    assert timed is not None
+    assert [slot.step.behavior for slot in timed.slots] == (["E1", "E2"] if given else ["E2", "E1"])
+
+
 @pytest.mark.parametrize(("seconds", "status"), [(3, Status.GAVE_UP), (7, Status.SOLVED)])
 def test_a_plan_that_ends_with_an_external_event_contains_all_earlier_events(
     seconds: int, status: Status, tmp_path: Path
