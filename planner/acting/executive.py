@@ -46,6 +46,7 @@ from confab.planner.acting.world import INTERRUPTED, WITHOUT_EFFECT, Guarded, Ve
 from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, SoftGoal, Status, Step, renumbered
 from confab.planner.timed.activities import InapplicableError, StepSimulation
+from confab.planner.timed.pieces import actors_of_step, default_actors
 from confab.planner.validation import followed, open_goals, unmet_goals
 from confab.reasoner.derivation import said_by
 from confab.reasoner.limits import LimitError, check, current
@@ -227,9 +228,10 @@ class _RunningEpisode:
                 yield Reason(
                     f"{said_by(problem, goal)} is a goal by {float(by):g} s, and holds from {reached:g} s on{known}"
                 )
+        resting = default_actors(problem)
         for event in self.record.events:
             took = f"{event.step} took from {event.begin:g} to {event.end:g} s"
-            for one in event.step.arguments:
+            for one in dict.fromkeys((*event.step.arguments, *actors_of_step(problem, event.step, resting))):
                 windows = times.windows.get(one, ((Fraction(0), None),))
                 if not any(low <= event.begin and (high is None or event.end <= high) for low, high in windows):
                     yield Reason(f"{took}, and {one} isn't available then")

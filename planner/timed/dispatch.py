@@ -239,7 +239,8 @@ class Dispatch:
             for _, high, k, low in self.out_of[i]:
                 at = self.network.at[k]
                 its = time + (most[i] if high == END else 0) + self.network.least(i, high, k, low)
-                by = at if at is not None else self.begun[k] + least[k] if k in self.begun and low == END else inf
+                begin = at if at is not None else self.begun.get(k, inf) if low == END else inf
+                by = begin + (least[k] if low == END else 0)
                 if its > by:
                     return inf
             return begins.begins[i]

@@ -17,6 +17,7 @@ from fractions import Fraction
 
 from confab.planner.checked_amounts import worth
 from confab.planner.checked_conditions import Arguments, ConditionReader
+from confab.planner.plan import Step
 from confab.planner.validation import BehaviorReader, LoggedState
 from confab.reasoner.amounts import Quantity
 from confab.reasoner.derivation import deciding
@@ -127,6 +128,13 @@ def actors_of(problem: Problem, behavior: Behavior, arguments: Arguments, restin
         given: Mapping[str, str] = dict(zip((t.name for t in with_fixed(behavior).parameters), arguments, strict=False))
         return tuple(dict.fromkeys(given.get(actor, actor) for actor in stated))
     return next(((argument,) for argument in arguments if argument in resting), ())
+
+
+def actors_of_step(problem: Problem, step: Step, resting: frozenset[str]) -> tuple[str, ...]:
+    """Return the actors of a step, as far as its arguments and bindings determine them; `resting` is as for `actors_of`."""
+    behavior = problem.domain.behaviors[step.behavior]
+    fixed = (step.bindings.get(v.name[1:], v.name) for v in fixed_at_begin(behavior))
+    return actors_of(problem, behavior, (*step.arguments, *fixed), resting)
 
 
 def default_actors(problem: Problem) -> frozenset[str]:

@@ -17,7 +17,7 @@ from fractions import Fraction
 
 from confab.planner.checked_conditions import Arguments
 from confab.planner.plan import Plan, Step
-from confab.planner.timed.pieces import Pieces, actors_of, default_actors, duration_of, pieces_of, terms_at
+from confab.planner.timed.pieces import Pieces, actors_of_step, default_actors, duration_of, pieces_of, terms_at
 from confab.planner.timed.plan import Slot, TimedPlan
 from confab.planner.validation import (
     BehaviorReader,
@@ -199,10 +199,7 @@ class _TimedExecution:
         """Yield the actors in two steps at once, the steps that overlap with themselves, and the unavailable individuals."""
         lanes: dict[str, list[Slot]] = {}
         for slot in self.timed.slots:
-            behavior = self.problem.domain.behaviors[slot.step.behavior]
-            fixed = self.piece(behavior.name).fixed
-            terms = (*slot.step.arguments, *(slot.step.bindings.get(v.name[1:], v.name) for v in fixed))
-            its = actors_of(self.problem, behavior, terms, self.resting)
+            its = actors_of_step(self.problem, slot.step, self.resting)
             for one in its or (str(slot.step),):
                 lanes.setdefault(one, []).append(slot)
             for one in dict.fromkeys((*slot.step.arguments, *its)):

@@ -14,6 +14,8 @@ from confab.planner.acting.dispatching import Concurrency, later
 from confab.planner.acting.episode import End, Episode, Event, Intervention, InterventionKind
 from confab.planner.acting.executive import act
 from confab.planner.acting.symbolic_world import SymbolicWorld
+from confab.planner.solve import Request, solve
+from confab.planner.timed.call import best_in_time
 from confab.planner.timed.plan import Slot, TimedPlan
 from confab.planner.timed.validation import validate_timed
 from confab.reasoner.pddl.importing import imported
@@ -24,7 +26,7 @@ from confab.reasoner.symbols import Fact, Symbol, Times
 from tests.planner.serving import planned, serving
 from tests.planner.test_dispatch import burning, fuse
 from tests.reasoner.test_durative import CELLAR, FUSES, TRUCK, WAY
-from worlds.timed import problem_of
+from worlds.timed import Action, TimedWorld, problem_of
 
 FILLED, MOVED = Symbol("BEVERAGE", ("cup1",)), Symbol("LOCATION", ("cup2",))
 SERIAL = 32
@@ -185,3 +187,28 @@ def test_imported_durative_actions_and_timed_literals_are_executed_in_time(
     run = confab.load(file).execute()
     assert run.reached
     assert run.episode.seconds["simulated"] == pytest.approx(seconds, abs=0.01)
+
+
+def test_a_step_outside_of_the_window_of_its_actor_makes_an_episode_impossible() -> None:
+    problem = problem_of(
+        TimedWorld(1, (Action(3, 0, (), (("end", (0, True)),)),), frozenset(), ((0, True),), windows=((0, 0, 3),))
+    )
+    for factor, status in ((1, End.REACHED), (2, End.IMPOSSIBLE)):
+        slower = SymbolicWorld(problem, stretch=partial(Fraction.__mul__, Fraction(factor)))
+        assert act(problem, slower, together=Concurrency()).status is status
+
+
+@pytest.mark.parametrize(("spread", "status"), [(0, End.REACHED), (Fraction(1, 10), End.GAVE_UP)])
+def test_a_step_ends_before_an_external_event_ends_if_its_duration_is_certain(spread: Fraction, status: End) -> None:
+    flash = Action(4, None, (), (("start", (1, True)), ("end", (0, True)), ("end", (1, False))))
+    event = Action(1, None, (), (("end", (1, True)),))
+    problem = problem_of(TimedWorld(2, (event, flash), frozenset(), ((0, True), (1, True))))
+    problem = replace(problem, times=Times(events={"A0": Fraction(3)}))
+    plan = solve(Request(problem)).plan
+    assert plan is not None
+    timed = best_in_time(problem, plan).plan
+    assert timed is not None
+    assert timed.makespan == 4
+    assert (
+        act(problem, SymbolicWorld(problem), timed.plan, together=Concurrency(timed, Fraction(spread))).status is status
+    )
