@@ -81,7 +81,10 @@ def pieces_of(problem: Problem, behavior: Behavior) -> Pieces:
 
 
 def free_totals(problem: Problem) -> frozenset[str]:
-    """Return the totals without bounds that decide no goal with a deadline; a step that reads a total reads the facts that determine it."""
+    """Return the totals without bounds that decide no goal with a deadline.
+
+    A step that reads such a total reads the facts that determine the total.
+    """
     deadlines = problem.times.deadlines if problem.times is not None else ()
     timed = {deciding(problem, goal).situation for goal in deadlines if goal in problem.goal}
     kinds, every = problem.domain.situations, problem.domain.aggregates.items()
