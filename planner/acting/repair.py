@@ -7,12 +7,16 @@ individuals are then put off, too. The steps that were put off are tried again a
 achieves the remaining goals, on the same state table. If a hand is in the middle of a step, the step is finished first, or the hand
 is brought to rest.
 
+If this repair fails and the goal has changed, the repair is the rest of the plan without the primitives that are now wrong or
+superfluous. This repair keeps the primitives that several steps of the first level share.
+
 `confab.planner.validation` checks every repaired plan.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
 
@@ -27,11 +31,11 @@ from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, Status, 
 from confab.planner.plan_costs import cost_of, costs_of_steps
 from confab.planner.preferences import preferred
 from confab.planner.transitions import Cell, arguments_of, key_of
-from confab.planner.validation import validate
+from confab.planner.validation import BehaviorReader, LoggedState, validate
 from confab.reasoner.amounts import meets
 from confab.reasoner.limits import LimitError, check, within
 from confab.reasoner.problem import Problem
-from confab.reasoner.symbols import FALSE, State, Symbol
+from confab.reasoner.symbols import FALSE, State, Symbol, Times
 from confab.reasoner.timing import may_overlap_by_need
 
 CLOSE = 1.1
@@ -93,6 +97,11 @@ def repair_or_replan(
     repaired = repair(problem, rest, planned, using, in_progress, limits, begun)
     if repaired is not None and rejected(problem, repaired.steps):
         repaired = None
+    if repaired is None and planned.goal != problem.goal:
+        left = limits.until(end).seconds
+        with suppress(LimitError), within(None if left is None else SHARE * left):
+            kept = still_needed(problem, rest)
+            repaired = None if kept is None else Repaired(kept, cost_of(problem, Plan(kept)), 0.0)
     fewer = planned.goal.keys() - problem.goal.keys()  # steps for a goal that was dropped may be superfluous
     if repaired is not None and not fewer and repaired.cost <= repaired.least:
         return RepairResult("repair", repaired.steps, repaired.cost)
@@ -100,6 +109,61 @@ def repair_or_replan(
     if repaired is not None and (anew is None or repaired.cost <= CLOSE * cost_of(problem, Plan(anew))):
         return RepairResult("repair", repaired.steps, repaired.cost)
     return RepairResult("replan", anew, cost_of(problem, Plan(anew or ())), outcome)
+
+
+def still_needed(problem: Problem, rest: Sequence[Step]) -> tuple[Step, ...] | None:
+    """Return steps without the primitives that changed goals make wrong or superfluous, or None if the others aren't a plan.
+
+    A primitive is wrong if it changes a goal that holds before it and no longer holds at the end. The sub-steps of a step that
+    loses a primitive take its place.
+    """
+    primitives = Plan(renumbered(rest)).primitives
+    rules, events = BehaviorReader(problem), (problem.times or Times()).events
+    wrong = set[int]()
+    for _ in primitives:
+        facts, after = LoggedState(problem, problem.initial, rules), dict[Symbol, list[int]]()
+        for number, step in enumerate(primitives):
+            changes = rules.changes(problem.domain.behaviors[step.behavior], step.arguments, facts)
+            if number in wrong or changes is None:
+                wrong.add(number)
+                continue
+            for symbol in {Symbol(situation, key) for situation, key, _ in changes} & problem.goal.keys():
+                if meets(facts.value(symbol.situation, symbol.arguments) or FALSE, problem.goal[symbol]):
+                    after[symbol] = []
+                if symbol in after:
+                    after[symbol].append(number)
+            for change in changes:
+                facts.put(*change)
+        lost = [
+            number
+            for symbol, numbers in after.items()
+            if not meets(facts.value(symbol.situation, symbol.arguments) or FALSE, problem.goal[symbol])
+            for number in numbers
+        ]
+        if not lost:
+            break
+        wrong.update(lost)
+
+    def without(some: set[int]) -> tuple[Step, ...]:
+        gone = {primitives[number].path for number in some}
+
+        def left(step: Step) -> tuple[Step, ...]:
+            if not step.steps:
+                return () if step.path in gone else (step,)
+            inside = tuple(one for child in step.steps for one in left(child))
+            return (step,) if inside == step.steps else inside
+
+        return tuple(one for step in renumbered(rest) for one in left(step))
+
+    if rejected(problem, without(wrong)):
+        return None
+    numbers = {step.path: number for number, step in enumerate(primitives)}
+    for step in reversed([step for one in renumbered(rest) for step in one.walk()]):
+        check("repairing the plan")
+        its = {numbers[one.path] for one in step.walk() if not one.steps and one.behavior not in events}
+        if not its <= wrong and not rejected(problem, without(wrong | its)):
+            wrong |= its
+    return without(wrong)
 
 
 def chosen(problem: Problem, search: Callable[[Problem], RepairResult]) -> tuple[Problem, RepairResult]:

@@ -255,6 +255,25 @@ def test_a_step_in_progress_is_not_finished_if_no_goal_requires_it_any_more() ->
     assert repaired.cost <= others + cost_of(serving(), Plan(rest[:1]))
 
 
+def test_the_rest_of_the_plan_without_superfluous_steps_is_a_repair_if_no_other_is_found(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("confab.planner.acting.repair.repair", lambda *_: None)
+    fewer = dict(list(serving().goal.items())[1:])
+
+    def none(there: Problem, /, *, limits: Limits) -> Outcome:
+        return Outcome(Status.GAVE_UP)
+
+    found = repair_or_replan(replace(serving(), goal=fewer), planned().steps, serving(), none, using())
+    assert found.kind == "repair"
+    assert found.steps is not None
+    dropped, added = difference(planned().steps, found.steps)
+    assert dropped > 0
+    assert added == 0
+    end = carried_out(serving(), serving().initial, found.steps)
+    assert all(end[symbol] == value for symbol, value in fewer.items())
+
+
 def test_undone_steps_are_repeated_first_and_the_planned_steps_are_kept() -> None:
     done = len(Plan(planned().steps[:2]).primitives)
     assert {step.arguments[0] for step in planned().steps[:2]} == {"cup1", "cup2"}
