@@ -98,6 +98,8 @@ def shorter(
     while True:
         before = task.cost_of(best)
         for size in SIZES:
+            if windows.over:
+                break
             best = windows.pass_over(best, size)
             best = cheaper(task, best, windows.pass_over(regrouped(task, best), size))
         if task.cost_of(best) < before:

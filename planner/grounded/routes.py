@@ -321,10 +321,11 @@ class _RouteChanges:
         self.random, self.steps = Random(0), list(dict.fromkeys(plan))
         self.names = {operator: task.describe(operator)[1] for operator in self.steps}
         self.symbols: dict[int, Symbol | int] = {}
+        served &= (1 << len(task.facts)) - 1
         for operator in self.steps:
             changed = _changes(task, operator) & served
-            bits = (bit for bit, _ in enumerate(task.facts) if changed >> bit & 1)
-            self.symbols[operator] = next((task.facts[bit].symbol for bit in bits), operator)
+            lowest = (changed & -changed).bit_length() - 1
+            self.symbols[operator] = task.facts[lowest].symbol if changed else operator
         self.weighted: dict[Callable[[list[int]], None], int] = {
             self.removed: 7, self.inserted: 5, self.beside: 14, self.pair_beside: 14,
             self.moved: 10, self.several_moved: 25, self.symbol_moved: 17, self.reversed: 8,

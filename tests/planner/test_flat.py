@@ -224,6 +224,14 @@ def carrier(parcels: int) -> Problem:
     return imported(parse(domain, text)).problem
 
 
+def test_shortening_makes_no_other_order_of_the_steps_after_the_deadline(monkeypatch: pytest.MonkeyPatch) -> None:
+    task, found = ground(carrier(6)), list[int]()
+    assert isinstance(task, Task)
+    search(task, found=found.extend)
+    monkeypatch.setattr("confab.planner.grounded.plan_windows.regrouped", lambda *_: pytest.fail("another order"))
+    assert task.cost_of(shorter(task, found, work=10**7, deadline=0.0)) <= task.cost_of(found)
+
+
 def test_windows_shorten_a_plan_that_still_achieves_the_goal() -> None:
     task = ground(carrier(6))
     assert isinstance(task, Task)
