@@ -94,7 +94,14 @@ def of_any_plan(problem: Problem) -> Fraction:
 
 
 def too_early(problem: Problem) -> TooEarly | None:
-    """Return a goal that no plan reaches by its deadline, or None if no such goal is known."""
+    """Return a goal that no plan reaches by its deadline, or None if no such goal is known.
+
+    No goal is known if totals have bounds, as constraints on every state do: a bound is compiled to conditions at the begin of a
+    step, but a step that ends at the same time may satisfy it.
+    """
+    quantities = [problem.domain.situations[name].quantity for name in problem.domain.aggregates]
+    if any(one is not None and not (one.least is None and one.most is None) for one in quantities):
+        return None
     deadlines = problem.times.deadlines if problem.times else {}
     level = problem.domain.levels[-1]
     wanted = {s: v for s, v in problem.goal.items() if s in deadlines and s not in problem.weights}
