@@ -20,6 +20,7 @@ from itertools import permutations
 
 from confab.planner.hierarchical.operators import named
 from confab.planner.validation import BehaviorReader, LoggedState
+from confab.reasoner.afterwards import closed
 from confab.reasoner.amounts import Amount, inside, meets, towards
 from confab.reasoner.derivation import strata
 from confab.reasoner.language import substituted, terms, walk
@@ -110,9 +111,9 @@ class PlanTrace:
         """Yield ground conditions without quantifiers and alternatives.
 
         A quantified condition is replaced by the conditions of an individual that satisfies the condition; alternatives
-        are replaced by an alternative that holds.
+        are replaced by an alternative that holds. In a negated condition, local variables become explicit witnesses.
         """
-        for condition in (substituted(lifted, bound) for lifted in conditions):
+        for condition in (substituted(lifted, bound) for lifted in closed(conditions, frozenset(bound), kinds)):
             if isinstance(condition, Witness) and not condition.negated:
                 inner = {**kinds, condition.variable: condition.kind}
                 wanted = (*condition.conditions, ClassCondition(condition.variable, condition.kind))

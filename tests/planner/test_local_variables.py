@@ -88,3 +88,13 @@ def test_a_behavior_is_applicable_with_alternatives_in_different_rooms(tmp_path:
     behavior = BEHAVIOR.replace(":lamp, :plug", f":lamp.any, {second}")
     found = scene(tmp_path, behavior + ALTERNATIVES + more + LIT)
     assert "GLOW" in {row["behavior"] for row in found.affordances()}
+
+
+def test_a_rule_is_learned_from_a_behavior_that_forbids_a_plug_in_some_room(tmp_path: Path) -> None:
+    room = ":plug c:condition [ a c:EqualityCondition ; c:about :x.v ; c:value :k1 ] .\n"
+    found = scene(tmp_path, BEHAVIOR + room + LIT, NOT_THERE)
+    memory = confab.Memory.of(found)
+    memory.learn(found, found.plan())
+    memory.save(tmp_path / "memory.ttl")
+    again = found.plan(memory=tmp_path / "memory.ttl")
+    assert [step.behavior for step in again.plan.primitives] == ["GLOW"]
