@@ -342,18 +342,23 @@ class _RunningEpisode:
         """Return the dispatch of the remaining primitives; without a schedule, one primitive at a time is executed from now on."""
         assert self.together is not None
         now, steps = Fraction(self.world.seconds), self.agenda.steps
-        free = 1 + max(path[0] for path in (*self.record.done, *(step.path for step in steps)))
         happened = {event.step.behavior for event in self.record.events}
-        found = remaining(self.belief.task, steps, now, self.together, free, happened)
+        found = remaining(self.belief.task, steps, now, self.together, self.free(), happened)
         if isinstance(found, Reason):
-            self.together, times = None, self.belief.problem.times or Times()
-            if times.windows or times.events:  # one primitive after another would ignore them
+            self.together = None
+            if self.by_the_clock:  # one primitive after another would ignore windows and events
                 self.give_up(found)
             return None
         self.agenda.steps = found.steps
         for goal in found.given_up:
             self.tell_late(goal, now)
         return found
+
+    @property
+    def by_the_clock(self) -> bool:
+        """Whether the task has time windows or external events."""
+        times = self.belief.problem.times or Times()
+        return bool(times.windows or times.events)
 
     def tell_late(self, goal: Symbol, now: Fraction) -> None:
         """Say once that the deadline of a goal can't be kept any more."""
@@ -380,6 +385,7 @@ class _RunningEpisode:
         ended = self.world.execute_together(dispatch, may_begin)
         self.note_what_happened_by_the_clock()
         seen, every = self.world.observe(), {chain[-1].path: chain for chain in chains_of(self.agenda.steps)}
+        paths = (*paths, *self.unplanned([slot.step for slot, _ in ended if slot.position >= len(paths)], every))
         chains = [every[paths[slot.position]] for slot, _ in ended]
         course = StepSimulation(self.belief.task, [chain[-1] for chain in chains])
         starts = dict[int, State]()
@@ -422,8 +428,21 @@ class _RunningEpisode:
         if len(record.events) >= self.retries.most:
             self.give_up(Reason(f"stopped at the limit of {self.retries.most} primitives"))
         for chain, before, verdict in failed:
-            self.together = self.together if verdict.code == INTERRUPTED else None
+            self.together = self.together if verdict.code == INTERRUPTED or self.by_the_clock else None
             self.learn_from(chain, before, verdict)
+
+    def unplanned(
+        self, events: Iterable[Step], every: dict[tuple[int, ...], tuple[Step, ...]]
+    ) -> Iterator[tuple[int, ...]]:
+        """Yield the paths of external events that have happened and weren't in the dispatch, and add the events to `every`."""
+        free = self.free()
+        for number, event in enumerate(events, free):
+            every[number,] = (replace(event, path=(number,)),)
+            yield (number,)
+
+    def free(self) -> int:
+        """Return the number of the first step that can be added at the top of the tree of executed and remaining steps."""
+        return 1 + max(path[0] for path in (*self.record.done, *(step.path for step in self.agenda.steps)))
 
     def without_effect(self, changes: Sequence[Fact], seen: State) -> bool:
         """Return whether some of the expected changes are perceptible, but none of them was perceived."""

@@ -62,6 +62,7 @@ class SymbolicWorld:
         self._stretch = stretch
         self._waiting: list[Intervention] = []
         self._news: list[Discovery] = []
+        self._happened = set[str]()  # behaviours that were executed with others, and external events
 
     def observe(self) -> State:
         """Return the whole state."""
@@ -92,13 +93,22 @@ class SymbolicWorld:
     def execute_together(
         self, dispatch: Dispatch, may_begin: Callable[[Set[int]], bool]
     ) -> list[tuple[WorkerSlot, WorldReport]]:
-        """Execute the primitives of a dispatch; an intervention stops the primitives that read or change a changed fact."""
+        """Execute the primitives of a dispatch; an intervention stops the primitives that read or change a changed fact.
+
+        External events that aren't in the dispatch happen, too, as long as primitives remain. Their slots have the positions after
+        the primitives of the dispatch.
+        """
         start, now = Fraction(self.seconds), Fraction(0)
-        course = StepSimulation(replace(self.problem, initial=self.state), list(map(dispatch.step, dispatch.waiting)))
+        steps = list(map(dispatch.step, dispatch.waiting))
+        coming = self._other_events({*self._happened, *(step.behavior for step in steps)})
+        course = StepSimulation(
+            replace(self.problem, initial=self.state), [*steps, *(self._event(name) for _, name in coming)]
+        )
+        dates = [(at - start, number) for number, (at, _) in enumerate(coming, len(steps))]
         running, ended = list[tuple[Fraction, int, Fraction]](), dict[int, tuple[WorkerSlot, WorldReport]]()
 
         def report(number: int, begin: Fraction, verdict: WorldReport) -> None:
-            worker = "".join(dispatch.order.activities[number].actors[:1])
+            worker = "".join(dispatch.order.activities[number].actors[:1]) if number < len(steps) else ""
             slot = WorkerSlot(course.steps[number], number, worker, float(start + begin), float(start + now))
             ended[number] = slot, verdict
 
@@ -108,9 +118,17 @@ class SymbolicWorld:
             running[:] = sorted(one for one in running if one[1] not in stopped)
 
         def going_on() -> bool:
-            return all(verdict.ok for _, verdict in ended.values()) and may_begin(ended.keys())
+            own = {number for number in ended if number < len(steps)}
+            return all(ended[number][1].ok for number in own) and may_begin(own)
 
         while True:
+            while dates and dates[0][0] <= now and (running or dispatch.waiting):
+                number = dates.pop(0)[1]
+                self._happened.add(course.steps[number].behavior)
+                with suppress(InapplicableError):  # an inapplicable event has no effect
+                    course.begin(number)
+                    heappush(running, (now + course.seconds[number], number, now))
+                    interrupt(course.lost(other for _, other, _ in running if other != number))
             while going_on() and (ready := dispatch.ready(now)):
                 number = ready[0]
                 try:
@@ -119,6 +137,7 @@ class SymbolicWorld:
                     report(number, now, _inapplicable(course.steps[number], str(error)))
                     break
                 dispatch.begin(number, now)
+                self._happened.add(course.steps[number].behavior)
                 given = self._seconds_of.get(course.steps[number].behavior, course.seconds[number])
                 heappush(running, (now + self._stretch(Fraction(given)), number, now))
                 interrupt(course.lost(other for _, other, _ in running if other != number))
@@ -126,6 +145,7 @@ class SymbolicWorld:
             times = [end for end, *_ in running[:1]] + ([] if wakes is None else [wakes])
             if not times:
                 break
+            times += [at for at, _ in dates[:1]]
             if self._waiting and Fraction(self._waiting[0].at or 0.0) - start < min(times):
                 self.state = course.facts.state()
                 self._disturbed_by_the_clock()
@@ -137,10 +157,20 @@ class SymbolicWorld:
             while running and running[0][0] == now:
                 _, number, begin = heappop(running)
                 report(number, begin, self._ended(course, number))
-                dispatch.end(number, now)
+                if number < len(steps):
+                    dispatch.end(number, now)
                 interrupt(course.lost(other for _, other, _ in running))
         self.state = course.facts.state()
         return sorted(ended.values(), key=lambda one: (one[0].begin, one[0].position))
+
+    def _other_events(self, known: Container[str]) -> list[tuple[Fraction, str]]:
+        """Return the times and names of the external events from now on, except for the known ones."""
+        events = self.problem.times.events if self.problem.times is not None else {}
+        return sorted((at, name) for name, at in events.items() if at >= self.seconds and name not in known)
+
+    def _event(self, name: str) -> Step:
+        """Return an external event as a step."""
+        return Step((), self.problem.id_of(name, ()), self.problem.domain.behaviors[name].level, name, ())
 
     def _ended(self, course: StepSimulation, number: int) -> WorldReport:
         """Make the effects of the end of a primitive, unless a fault prevents them."""

@@ -153,6 +153,28 @@ def test_an_external_event_stops_a_late_step_that_needs_what_the_event_changes(t
     assert not late.reached
 
 
+def test_an_external_event_after_the_end_of_the_plan_stops_a_late_step(tmp_path: Path) -> None:
+    """The plan ends before the event, and doesn't contain it; the late step needs what the event changes."""
+    dark = happening("DARK", 12, "dark", "a", OFF)
+    scene = load(tmp_path, WORK, dark, DONE)
+    assert scene.execute().reached
+    late = scene.execute(perturb=True, seed=2)
+    assert not late.reached
+    assert [(one.step.behavior, one.ok) for one in late.episode.events] == [("WORK", False), ("DARK", True)]
+    again = load(tmp_path, WORK, dark, REPAIR, DONE).execute(perturb=True, seed=2)
+    assert again.reached
+    assert [one.step.behavior for one in again.episode.events if one.ok] == ["DARK", "REPAIR", "WORK"]
+
+
+def test_an_external_event_after_the_end_of_the_plan_lets_a_late_step_go_on_that_it_doesnt_concern(
+    tmp_path: Path,
+) -> None:
+    late = load(tmp_path, WORK, happening("LIT", 12, "lit", "b2"), DONE).execute(perturb=True, seed=2)
+    assert late.reached
+    assert [one.step.behavior for one in late.episode.events] == ["WORK", "LIT"]
+    assert late.episode.events[0].end > late.episode.events[1].begin == 12
+
+
 @pytest.mark.parametrize("seconds", [8, 12, 20])
 def test_new_steps_of_an_episode_take_place_beside_external_events(seconds: int, tmp_path: Path) -> None:
     scene = load(tmp_path, WORK, REPAIR, happening("EVENT", seconds, "b2.on", "b2"), DONE)
