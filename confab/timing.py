@@ -13,7 +13,7 @@ from confab.planner.timed.plan import schedule_of
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import Deadline
 from confab.reasoner.problem import Problem
-from confab.reasoner.timing import only_during
+from confab.reasoner.timing import judged_by_events, only_during
 
 if TYPE_CHECKING:
     from confab.planner.timed.plan import Slot, TimedPlan
@@ -76,8 +76,8 @@ def scheduled(
 
 
 def needs_others_meanwhile(problem: Problem) -> bool:
-    """Return whether behaviours need a value that another behaviour gives only during its execution."""
-    return bool(only_during(problem))
+    """Return whether steps may overlap, and some need a value that another step gives only during its execution."""
+    return judged_by_events(problem) and bool(only_during(problem))
 
 
 # --------------------------------------------------------------------------------------------------------------- forms

@@ -139,7 +139,7 @@ def _overlapping(request: Request, deadline: Deadline) -> Outcome:
     if first is not None and schedule_of(first) is not None:
         return Outcome(Status.GAVE_UP, reason=Reason("a plan whose steps must overlap isn't changed"))
     outcome = Outcome(Status.GAVE_UP, reason=Reason("some steps need other steps meanwhile"))
-    if not only_during(problem):
+    if not (by_event and only_during(problem)):
         seconds = None if deadline.left is None else IN_SEQUENCE * deadline.left
         outcome = MODES[request.mode](replace(request, limits=replace(request.limits, seconds=seconds)))
         if outcome.plan is not None:
