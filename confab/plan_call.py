@@ -300,6 +300,7 @@ def choose_and_search(task: PlanningTask, problem: Problem) -> tuple[Problem, Ou
     bounded, worked = first._replace(share=CHOICE, most_work=CHOICE_WORK), 0
     kept = (seconds or 0.0) * (KEPT_IN_TIME if asks_for_times(problem, task.options.minimise) else KEPT)
     known: dict[tuple[object, ...], Outcome] = {}
+    fixed = task.options.by_engine or mode == "paper"
     searches, begin = list[Outcome](), perf_counter()
 
     def counted(found: Outcome) -> Outcome:
@@ -311,8 +312,23 @@ def choose_and_search(task: PlanningTask, problem: Problem) -> tuple[Problem, Ou
             return first
         return bounded._replace(most_work=max(CHOICE_WORK, 2 * worked))
 
+    def in_shorter_time(choice: Problem, found: Outcome) -> Outcome:
+        from confab.planner.timed.call import keeps_times
+
+        timed = task.with_measured_durations(choice)
+        if fixed or found.plan is None or keeps_times(timed, found.plan):
+            return found
+        with suppress(OutOfTimeError):
+            other = counted(search(task, choice, comparing(choice)._replace(shortening="compared", first=found)))
+            if other.plan is not None and keeps_times(timed, other.plan):
+                return other
+        return found
+
     def in_its_times(choice: Problem, found: Outcome) -> Outcome:
-        if found.plan is None or not asks_for_times(choice, None):
+        if not asks_for_times(choice, None):
+            return found
+        found = in_shorter_time(choice, found)
+        if found.plan is None:
             return found
         key = (*choice.goal, *((step.behavior, step.arguments) for step in found.plan.primitives))
         if key not in known:
@@ -337,7 +353,6 @@ def choose_and_search(task: PlanningTask, problem: Problem) -> tuple[Problem, Ou
         how = bounded._replace(first=found)
         return in_its_times(choice, counted(search_in_time(task, how, kept, "the time limit", choice)))
 
-    fixed = task.options.by_engine or mode == "paper"
     extend = None if fixed else extended
     if mode != "optimal":
         chosen, outcome = preferred(alike, choose, shorten=None if fixed else shorten, extend=extend)
