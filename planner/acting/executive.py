@@ -220,10 +220,9 @@ class _RunningEpisode:
         problem = self.belief.problem
         times = problem.times or Times()
         for goal, by in times.deadlines.items():
-            if (
-                goal in problem.goal.keys() - self.soft.keys()
-                and (reached := holds_from(problem, goal, self.record.initial, self.record.course)) > by
-            ):
+            if goal in problem.goal.keys() - self.soft.keys() and (
+                reached := holds_from(problem, goal, self.record.initial, self.record.course)
+            ) > float(by):
                 known = f"; this was known at {float(self.late[goal]):g} s" if goal in self.late else ""
                 yield Reason(
                     f"{said_by(problem, goal)} is a goal by {float(by):g} s, and holds from {reached:g} s on{known}"
@@ -233,10 +232,12 @@ class _RunningEpisode:
             took = f"{event.step} took from {event.begin:g} to {event.end:g} s"
             for one in dict.fromkeys((*event.step.arguments, *actors_of_step(problem, event.step, resting))):
                 windows = times.windows.get(one, ((Fraction(0), None),))
-                if not any(low <= event.begin and (high is None or event.end <= high) for low, high in windows):
+                if not any(
+                    float(low) <= event.begin and (high is None or event.end <= float(high)) for low, high in windows
+                ):
                     yield Reason(f"{took}, and {one} isn't available then")
             at = times.events.get(event.step.behavior)
-            if at is not None and event.begin != at:
+            if at is not None and event.begin != float(at):
                 yield Reason(f"{took}, and happens at {float(at):g} s")
 
     def break_off(self, why: str) -> None:
@@ -260,7 +261,7 @@ class _RunningEpisode:
         unmet = {fact.symbol for fact in open_goals(wanted)}
         for symbol, one in sorted(self.soft.items(), key=lambda each: (-each[1].weight, each[0])):
             by = deadlines.get(symbol)
-            late = by is not None and holds_from(wanted, symbol, self.record.initial, self.record.course) > by
+            late = by is not None and holds_from(wanted, symbol, self.record.initial, self.record.course) > float(by)
             yield one._replace(met=symbol not in unmet and not late)
 
     def whole(self) -> Plan:
@@ -382,6 +383,7 @@ class _RunningEpisode:
                     self.tell_late(late.goal, start + now)
             return not self.due({paths[number] for number in done})
 
+        interventions = len(record.interventions)
         ended = self.world.execute_together(dispatch, may_begin)
         self.note_what_happened_by_the_clock()
         seen, every = self.world.observe(), {chain[-1].path: chain for chain in chains_of(self.agenda.steps)}
@@ -419,7 +421,7 @@ class _RunningEpisode:
         state = _perceived(course.facts.state())
         self.belief.problem = replace(self.belief.problem, initial=state)
         surprises = self.look(dict(state), seen)
-        if not ended and not self.due():
+        if not ended and len(record.interventions) == interventions and not self.due():
             self.give_up(
                 Reason("no remaining step can begin: a window is over, or the order of two ends isn't certain")
             )

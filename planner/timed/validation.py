@@ -190,6 +190,10 @@ class _TimedExecution:
                 return
         yield from self.in_the_end()
 
+    def said(self, seconds: Fraction) -> str:
+        """Return a time, counted from the beginning of the plan of the whole task, as text."""
+        return f"{float(self.times.since + seconds):g}"
+
     def piece(self, name: str) -> Pieces:
         if name not in self.pieces:
             self.pieces[name] = pieces_of(self.problem, self.problem.domain.behaviors[name])
@@ -207,12 +211,15 @@ class _TimedExecution:
                 if windows is not None and not any(
                     low <= slot.begin and (high is None or slot.end <= high) for low, high in windows
                 ):
-                    yield Fault(slot.step.path, f"{slot.step}: {one} isn't available from {slot.begin} to {slot.end} s")
+                    yield Fault(
+                        slot.step.path,
+                        f"{slot.step}: {one} isn't available from {self.said(slot.begin)} to {self.said(slot.end)} s",
+                    )
         for actor, its_slots in sorted(lanes.items()):
             busy: Slot | None = None
             for slot in sorted(its_slots, key=lambda s: (s.begin, s.end)):
                 if busy is not None and slot.begin < busy.end:
-                    yield Fault(slot.step.path, f"{slot.step}: {actor} is in {busy.step} until {busy.end} s")
+                    yield Fault(slot.step.path, f"{slot.step}: {actor} is in {busy.step} until {self.said(busy.end)} s")
                 busy = slot if busy is None or slot.end >= busy.end else busy
 
     def happenings(self) -> Iterator[Fault]:
@@ -222,16 +229,16 @@ class _TimedExecution:
             its[slot.step.behavior].append(slot.step)
         for name, at in self.times.events.items():
             for again in its[name][1:]:
-                yield Fault(again.path, f"{again}: it happens only once, at {at} s")
+                yield Fault(again.path, f"{again}: it happens only once, at {self.said(at)} s")
         for name, at in omitted(self.problem, self.timed).items():
-            yield Fault((), f"{name} happens at {at} s, before the plan ends, and isn't in the plan")
+            yield Fault((), f"{name} happens at {self.said(at)} s, before the plan ends, and isn't in the plan")
 
     def begun(self, number: int, slot: Slot, time: Fraction) -> Iterator[Fault]:
         """Begin a step; yield its faults."""
         step, pieces, facts = slot.step, self.piece(slot.step.behavior), self.facts
         fixed = self.times.events.get(step.behavior)
         if fixed is not None and fixed != time:
-            yield Fault(step.path, f"{step}: it happens at {fixed} s, not at {time} s")
+            yield Fault(step.path, f"{step}: it happens at {self.said(fixed)} s, not at {self.said(time)} s")
         terms = terms_at(self.rules, pieces, step.arguments, facts)
         facts.clear()
         seconds = duration_of(self.problem, pieces.whole, terms, facts)
@@ -245,7 +252,9 @@ class _TimedExecution:
         facts.clear()
         making = self.rules.changes(pieces.middle, terms, facts)
         if making is None:
-            yield Fault(step.path, f"{step}: a condition throughout the step doesn't hold at its begin ({time} s)")
+            yield Fault(
+                step.path, f"{step}: a condition throughout the step doesn't hold at its begin ({self.said(time)} s)"
+            )
             return
         yield from self.foreign(one, [(name, key) for name, key, _ in making], time)
         one.making = making
@@ -274,7 +283,9 @@ class _TimedExecution:
         changes = self.rules.changes(piece, one.terms, self.facts)
         if changes is None:
             what = piece.name.rsplit("@")[-1]
-            yield Fault(one.slot.step.path, f"{one.slot.step}: a condition ({what}) doesn't hold at {time} s")
+            yield Fault(
+                one.slot.step.path, f"{one.slot.step}: a condition ({what}) doesn't hold at {self.said(time)} s"
+            )
             return
         yield from self.foreign(one, [(name, key) for name, key, _ in changes], time)
         for name, key, value in changes:
@@ -316,7 +327,7 @@ class _TimedExecution:
                 if (name, key) in read or (name, key) in changed or {(name, old), (name, value)} & values:
                     yield Fault(
                         one.slot.step.path,
-                        f"{one.slot.step}: {other.slot.step} is changing {name} of {', '.join(key)} at {time} s",
+                        f"{one.slot.step}: {other.slot.step} is changing {name} of {', '.join(key)} at {self.said(time)} s",
                     )
                     return
         for cell in (read | set(changed)) if self.separation else ():
@@ -351,7 +362,10 @@ class _TimedExecution:
                 yield Fault((), f"the goal {symbol} = {wanted} isn't reached: it is {got} in the end")
             latest, since = self.times.deadlines.get(symbol), self.met.get(symbol)
             if latest is not None and since is not None and since > latest:
-                yield Fault((), f"the goal {symbol} = {wanted} is reached at {since} s; it has to be by {latest} s")
+                yield Fault(
+                    (),
+                    f"the goal {symbol} = {wanted} is reached at {self.said(since)} s; it has to be by {self.said(latest)} s",
+                )
         if self.sequence is not None:
             for cell, number in sorted(self.sequence[1].items()):
                 if self.last.get(cell) != number:
