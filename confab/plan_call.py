@@ -316,12 +316,11 @@ def choose_and_search(task: PlanningTask, problem: Problem) -> tuple[Problem, Ou
         from confab.planner.timed.call import keeps_times
 
         timed = task.with_measured_durations(choice)
-        if fixed or found.plan is None or keeps_times(timed, found.plan):
-            return found
         with suppress(OutOfTimeError):
-            other = counted(search(task, choice, comparing(choice)._replace(shortening="compared", first=found)))
-            if other.plan is not None and keeps_times(timed, other.plan):
-                return other
+            if not fixed and found.plan is not None and not keeps_times(timed, found.plan):
+                other = counted(search(task, choice, comparing(choice)._replace(shortening="compared", first=found)))
+                if other.plan is not None and keeps_times(timed, other.plan):
+                    return other
         return found
 
     def in_its_times(choice: Problem, found: Outcome) -> Outcome:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -145,6 +145,11 @@ class Belief:
         by = {symbol: seconds for symbol, seconds in self.times.deadlines.items() if symbol in goal}
         times = self.problem.times and replace(self.problem.times, deadlines=by)
         self.problem = replace(self.problem, goal=dict(sorted(goal.items())), times=times)
+
+    def drop_deadlines(self, symbols: Collection[Symbol]) -> None:
+        """Forget the deadlines of symbols whose goals get other values."""
+        left = {symbol: by for symbol, by in self.times.deadlines.items() if symbol not in symbols}
+        self.times = replace(self.times, deadlines=left)
 
     def boolean(self, symbol: Symbol) -> bool:
         """Return whether a symbol is boolean; a boolean symbol that isn't observed is false."""

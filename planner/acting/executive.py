@@ -515,6 +515,7 @@ class _RunningEpisode:
         self.record.interventions.append((intervention, seconds))
         goal = self.belief.goal
         if intervention.change is InterventionKind.GOAL:
+            self.belief.drop_deadlines({f.symbol for f in intervention.facts if goal.get(f.symbol) != f.value})
             goal.update((fact.symbol, fact.value) for fact in intervention.facts)
             self.forget(fact.symbol for fact in intervention.facts)
         elif intervention.change is InterventionKind.DROP_GOAL and intervention.symbol is not None:
