@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -229,8 +229,8 @@ def in_time(
                     faults = validate_timed(problem, timed, separation)
                 if not faults:
                     return Timed(timed)
-                if events is None and (missing := omitted(problem, timed)):
-                    whole = _with_events(problem, timed, missing, separation, same_actors)
+                if events is None and omitted(problem, timed):
+                    whole = _with_events(problem, timed, separation, same_actors)
                     if whole is not None:
                         complete = in_time(problem, whole, left(), separation, same_actors=same_actors)
                         if complete.plan is not None:
@@ -245,18 +245,18 @@ def in_time(
         choices = replace(choices, of={turn: able for turn, able in choices.of.items() if moved and turn not in moved})
 
 
-def _with_events(
-    problem: Problem, timed: TimedPlan, missing: Mapping[str, Fraction], separation: Fraction, same_actors: bool
-) -> Plan | None:
-    """Return the plan with missing external events, or None if no place of an event has a schedule.
+def _with_events(problem: Problem, timed: TimedPlan, separation: Fraction, same_actors: bool) -> Plan | None:
+    """Return the plan with the external events that happen before its end, or None if no place of an event has a schedule.
 
     Each event follows all steps of the plan that don't begin after the event. If the steps have no schedule then, the last of these
     steps wait for the event: as few as possible, and at most `MOST_PLACES`. An event without such a place comes immediately before
-    the next event.
+    the next event, which may happen after the end of the plan.
     """
     times, now, waiting = problem.times or Times(), timed, list[Step]()
     happening = {step.behavior for step in now.plan.walk()}
-    for name, at in missing.items():
+    for name, at in sorted(times.events.items(), key=lambda one: (one[1], one[0])):
+        if name in happening or (at > now.makespan and not waiting):
+            continue
         happening.add(name)
         waiting.append(Step((), problem.id_of(name, ()), problem.domain.behaviors[name].level, name, ()))
         asked = replace(problem, times=replace(times, events={n: t for n, t in times.events.items() if n in happening}))

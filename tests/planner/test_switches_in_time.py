@@ -102,6 +102,20 @@ def test_the_steps_of_a_plan_wait_for_external_events_that_it_needs_not(
     assert timed.makespan == makespan
 
 
+@pytest.mark.parametrize(("lasting", "begin"), [(1, 2), (3, 9), (10, 14)])
+def test_a_step_waits_for_an_event_after_its_end_if_an_earlier_event_ends_what_it_needs(
+    lasting: int, begin: int, tmp_path: Path
+) -> None:
+    """What the step needs holds from 2 to 4 s, from 9 to 12 s, and from 14 s on."""
+    times = ((2, ""), (4, OFF), (9, ""), (12, OFF), (14, ""))
+    events = (happening(f"E{at}", at, f"e{at}", "a", more) for at, more in times)
+    dark = HEAD[: HEAD.index(":a.on")] + WORK.replace("PT10S", f"PT{lasting}S")
+    (tmp_path / "switches.ttl").write_text(dark + "".join(events) + DONE, "utf-8")
+    timed = confab.load(tmp_path / "switches.ttl").plan().timed
+    assert timed is not None
+    assert [slot.begin for slot in timed.slots if slot.step.behavior == "WORK"] == [begin]
+
+
 @pytest.mark.parametrize("given", ["", OFF])
 def test_external_events_at_the_same_instant_have_either_order(given: str, tmp_path: Path) -> None:
     """The event that the goal needs is possible before the other event, or after it."""
