@@ -92,11 +92,12 @@ def perform_together(
     problem: Problem,
     primitives: Sequence[Step],
     room: float = ROOM,
-    most: float = 600.0,
     may_begin: Callable[[Set[tuple[int, ...]]], bool] = lambda done: True,
     changed: Callable[[], Set[str]] = frozenset,
 ) -> Performance:
     """Execute primitives with all hands at once; each starts when its predecessors are done and no other hand works too near.
+
+    Primitives during which the arms touch each other fail, and no further primitive begins.
 
     Parameters
     ----------
@@ -106,8 +107,6 @@ def perform_together(
     primitives : sequence of Step
     room : float
         Minimum distance in metres between the places at which two hands work at the same time.
-    most : float
-        Simulated seconds after which the execution is given up.
     may_begin : callable
         Function of the paths of the finished primitives that returns whether further primitives may begin.
     changed : callable
@@ -135,11 +134,11 @@ def perform_together(
             current[-1].wait()
 
     done: dict[int, tuple[WorkerSlot, Verdict]] = {}
-    touching = 0
+    touching, touched = 0, set[int]()
     world.run = wait_for  # type: ignore[method-assign]
     try:
-        while len(done) < len(primitives) and world.seconds < most:
-            if all(verdict.ok for _, verdict in done.values()):
+        while len(done) < len(primitives):
+            if not touched and all(verdict.ok for _, verdict in done.values()):
                 running = [job.position for job in jobs]
                 new = ready(order, primitives, workers, [*done, *running], running, urgency, apart)
                 if new and may_begin({slot.step.path for slot, _ in done.values()}):
@@ -156,7 +155,8 @@ def perform_together(
                 current.pop()
                 if job.verdict is not None:
                     slot = WorkerSlot(job.step, job.position, job.worker, job.begin, world.seconds)
-                    done[job.position] = slot, job.verdict
+                    touch = job.position in touched and job.verdict.ok
+                    done[job.position] = slot, _touching(job) if touch else job.verdict
                     jobs.remove(job)
             step_once(1)
             moved = changed()
@@ -165,12 +165,18 @@ def perform_together(
                 job.interrupted = job.interrupted or not moved.isdisjoint(_concerned(world, job.step))
             if world.steps % LOOKING == 0 and arms_touch(world):
                 touching += LOOKING
+                touched |= {job.position for job in jobs}
     finally:
         world.run, world.moved_by_others = step_once, set()  # type: ignore[method-assign]
     ordered = sorted(done.values(), key=lambda pair: (pair[0].begin, pair[0].position))
     return Performance(
         tuple(slot for slot, _ in ordered), tuple(verdict for _, verdict in ordered), touching / world.rate
     )
+
+
+def _touching(job: _RunningPrimitive) -> Verdict:
+    """Return the verdict on a primitive that has succeeded although the arms have touched each other."""
+    return Verdict(False, "arms touch", job.step.arguments, message=f"the arms touch each other during {job.step}")
 
 
 def arms_touch(world: Engine) -> bool:

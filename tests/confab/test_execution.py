@@ -4,7 +4,7 @@ import json
 import subprocess
 import sys
 from io import StringIO
-from itertools import combinations
+from itertools import combinations, pairwise
 from pathlib import Path
 
 import pytest
@@ -423,6 +423,22 @@ def test_both_hands_in_pybullet_are_faster_and_never_touch() -> None:
     assert episode.failures == ()
     assert episode.done == episode.planned
     assert episode.seconds["simulated"] <= 0.75 * sum(event.end - event.begin for event in episode.events)
+
+
+@pytest.mark.slow
+def test_primitives_during_which_the_arms_touch_fail_and_one_hand_at_a_time_goes_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("confab.sim.together.arms_touch", lambda world: 8.2 < world.seconds < 8.3)
+    execution = confab.load("beverage-serving").execute(world="pybullet", both_hands=True)
+    events = execution.episode.events
+    touching = [event for event in events if event.begin < 8.2 and event.end > 8.3]
+    assert execution.reached
+    assert len(touching) == 2
+    assert {event.code for event in touching} == {"arms touch"} == {one.code for one in execution.episode.failures}
+    later = [event for event in events if event.begin > 8.3]
+    assert later
+    assert all(one.end <= other.begin for one, other in pairwise(later))
 
 
 @pytest.mark.slow
