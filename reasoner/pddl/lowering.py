@@ -220,6 +220,10 @@ class Lowering:
                     fits = not words.boolean and bound.issuperset(a for a in arguments if a in kinds)
                     if not fits or value in bound or not self.total(behavior, situation, arguments):
                         continue
+                    if is_variable(value) and any(
+                        value in mentions(c) for e in behavior.every_effect if when not in e.when for c in e.when
+                    ):
+                        continue  # another effect has a variable of its own with this name
                     others = sorted(self.range_of(situation) - self.kept.members(behavior, value))
                     if len(others) <= CASES:
                         left = tuple(one for one in behavior.effects if when not in one.when)

@@ -184,6 +184,17 @@ THING, OTHER, PLACE = Parameter("?x", "Thing"), Parameter("?y", "Thing"), Parame
 PLACE_IS_FREE = Witness("?z", "Thing", (at("?z", "?p"),), negated=True)
 LIGHT = ValueEffect("LIT", ("?x",), TRUE)
 MOVE = Behavior("MOVE", 1, (THING, PLACE), (), (PLACE_IS_FREE,), (ValueEffect("AT", ("?x",), "?p"),))
+ANY_PLACE = Behavior(
+    "ANY_PLACE",
+    1,
+    (),
+    variables=(Parameter("?p", "Place"),),
+    effects=(
+        ValueEffect("LIT", ("b",), TRUE, (at("b", "?p"),)),
+        ValueEffect("AT", ("a",), "n", (at("a", "?p"),)),
+        ValueEffect("AT", ("b",), "m", (at("b", "?p"),)),
+    ),
+)
 JUMP = Behavior("JUMP", 1, (THING, PLACE), (), (), (ValueEffect("AT", ("?x",), "?p"),))
 SWAP = Behavior(
     "SWAP",
@@ -208,6 +219,7 @@ SWAP = Behavior(
         ([replace(JUMP, effects=(ValueEffect("AT", ("b",), "m"), *JUMP.effects))], 1.0),
         ([replace(SWAP, preconditions=SWAP.preconditions[:2])], 1.0),
         ([replace(SWAP, effects=(ValueEffect("AT", ("?x",), "?q", (at("?y", "?q"),)), *SWAP.effects[1:]))], 1.0),
+        ([ANY_PLACE], 1.0),  # each effect has a variable of its own
         ([JUMP, replace(MOVE, name="NEVER", parameters=(Parameter("?x", "Empty"), PLACE))], 2.0),
         ([JUMP, replace(SWAP, preconditions=(*SWAP.preconditions, Witness("?e", "Empty", ())))], 2.0),
         ([replace(JUMP, preconditions=(ValueCondition("LIT", ("?x",), FALSE),), effects=(*JUMP.effects, LIGHT))], 2.0),
