@@ -1,4 +1,4 @@
-"""Sharing of goals among actors: the goals are planned again, in another order and with other actors, for a better schedule.
+"""Sharing of the work among actors: the goals are planned again, in another order and with other actors, for a better schedule.
 
 A crew restricts the actors and the steps towards a goal: it contains a chosen individual for each class of actors, barred actors,
 and barred steps. The chosen individual takes part in each step with actors of its class. The empty crew allows all actors and
@@ -7,9 +7,11 @@ state. The default planner finds the steps of a stretch. All goals that were ach
 
 The first sequence of tasks follows the plan, or assigns each goal greedily to the crew that achieves the goal first. Then the
 search makes one change at a time, preferably to a task on the critical path. A change concerns the crew or the position of a task.
-If the makespan is minimised with a time limit, the search goes on from the best sequence after a few changes, whatever they cost.
-The search ends if the schedule reaches a lower bound, if all actors are busy for the whole makespan, or after many changes without
-a better schedule. Without a time limit, the work is bounded, too, so that the result is the same on every machine.
+The first sequence and the best sequence are also improved by takeovers (`confab.planner.timed.takeovers`): an actor takes over
+single parts of the steps of another actor, whichever goal the steps serve. If the makespan is minimised with a time limit, the
+search goes on from the best sequence after a few changes, whatever they cost. The search ends if the schedule reaches a lower
+bound, if all actors are busy for the whole makespan, or after many changes without a better schedule. Without a time limit, the
+work is bounded, too, so that the result is the same on every machine.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from itertools import islice, permutations
+from itertools import accumulate, islice
 from math import inf
 from random import Random
 from time import perf_counter
@@ -33,8 +35,9 @@ from confab.planner.timed.activities import Activity, InapplicableError, activit
 from confab.planner.timed.listing import combinations
 from confab.planner.timed.network import earliest, network_of
 from confab.planner.timed.order import order_of
-from confab.planner.timed.pieces import actors_of, default_actors
+from confab.planner.timed.pieces import default_actors
 from confab.planner.timed.schedules import turn_edges
+from confab.planner.timed.takeovers import SharedSteps, Takeover, with_bindings
 from confab.planner.validation import BehaviorReader, LoggedState, validate
 from confab.reasoner.limits import LimitError, check
 from confab.reasoner.problem import Problem
@@ -60,6 +63,8 @@ DISTURBING, BARREN_ROUNDS = 4, 6
 Further rounds follow only if the schedule is late, or if the makespan is minimised with a time limit. Each round begins with the
 best sequence.
 """
+MOST_TAKEOVERS, MOST_EVEN = 100, 2
+"""Maximum number of takeovers of which the best one is chosen, and of successive takeovers after which no schedule is better."""
 MOST_KNOWN = 4
 """Maximum number of known sequences of steps that are tried for a stretch."""
 MOST_COMPILED = 200
@@ -88,14 +93,12 @@ SharedTask: TypeAlias = "tuple[Aim, Crew]"
 class Crew:
     """A crew: a chosen individual for each class of actors, the barred actors `without`, and the barred steps.
 
-    A barred step is a behaviour with its arguments; no arguments bar all steps of the behaviour. If the crew is `united`, as few
-    actors as possible take part in each step of the first level.
+    A barred step is a behaviour with its arguments; no arguments bar all steps of the behaviour.
     """
 
     chosen: tuple[tuple[str, str], ...] = ()
     without: frozenset[str] = frozenset()
     barred: frozenset[Ground] = frozenset()
-    united: bool = False
 
 
 @dataclass
@@ -127,6 +130,10 @@ class _Sequence:
     """
 
 
+def _steps_of(stretches: Sequence[_Stretch]) -> tuple[Step, ...]:
+    return renumbered(step for one in stretches for step in one.steps)
+
+
 def shared(
     problem: Problem, plan: Plan, until: float | None, shorten: bool = True, bound: Fraction = Fraction(0)
 ) -> Plan | None:
@@ -152,7 +159,7 @@ def shared(
     best = search.best
     if best is None:
         return None
-    return Plan(renumbered(step for one in best.stretches for step in one.steps))
+    return Plan(with_bindings(LoggedState(problem, problem.initial, search.rules), _steps_of(best.stretches)))
 
 
 def crews_of(problem: Problem) -> Iterator[Crew]:
@@ -181,12 +188,18 @@ def evenly_shared(problem: Problem, work: Fraction, makespan: Fraction) -> bool:
 
     `work` is the sum of the times during which the actors are busy.
     """
+    actors = every_actor(problem)
+    return bool(actors) and makespan * len(actors) <= work * BUSY
+
+
+def every_actor(problem: Problem) -> list[str]:
+    """Return the individuals that may be actors of a behaviour."""
     resting, actors = default_actors(problem), set[str]()
     for behavior in problem.domain.behaviors.values():
         actors.update(term for term in timing_of(behavior).actors if term not in behavior.kinds)
         for term in _actor_terms(problem, behavior, resting):
             actors.update(problem.members(behavior.kinds[term]))
-    return bool(actors) and makespan * len(actors) <= work * BUSY
+    return sorted(actors)
 
 
 def _actor_terms(problem: Problem, behavior: Behavior, resting: frozenset[str]) -> tuple[str, ...]:
@@ -245,20 +258,14 @@ class _SharingSearch:
         return BehaviorReader(self.problem)
 
     @cached_property
-    def crews(self) -> list[Crew]:
-        """The crews that the search may assign to tasks; if a step of the plan has several actors, each crew may be united."""
-        crews, steps = list(islice(crews_of(self.problem), MOST_CREWS)), self.plan.steps
-        resting = default_actors(self.problem)
-        if any(len(self.actors(step, resting)) > 1 for step in steps):
-            return [replace(crew, united=united) for united in (False, True) for crew in crews]
-        return crews
+    def actors(self) -> list[str]:
+        """The individuals that may be actors."""
+        return every_actor(self.problem)
 
-    def actors(self, step: Step, resting: frozenset[str]) -> list[str]:
-        """Return the actors of the primitives of a step."""
-        behaviors = self.problem.domain.behaviors
-        inside = [one for one in step.walk() if not one.steps]
-        its = (actors_of(self.problem, behaviors[one.behavior], one.arguments, resting) for one in inside)
-        return list(dict.fromkeys(actor for some in its for actor in some))
+    @cached_property
+    def crews(self) -> list[Crew]:
+        """The crews that the search may assign to tasks."""
+        return list(islice(crews_of(self.problem), MOST_CREWS))
 
     @cached_property
     def last(self) -> dict[Symbol, int]:
@@ -288,27 +295,34 @@ class _SharingSearch:
 
     def run(self) -> None:
         """Build the sequence of the plan and the greedy sequence, and improve the better sequence by changes."""
-        self.best, until, greedy = self.own(), self.until, None
+        self.best, until = self.own(), self.until
+        starts = [] if self.best is None else [self.best]
         if until is not None and self.best is not None and not self.best.cost[0]:
             self.until = (perf_counter() + until) / 2
         self.limit(MOST_WORK // 2)
+        for start in starts if not any(step.joined for step in self.plan.steps) else ():
+            self.remember(start)  # no single goal needs all steps of a joint refinement
         with suppress(LimitError):
-            for united in dict.fromkeys(crew.united for crew in self.crews):
-                other = self.greedy([crew for crew in self.crews if crew.united is united])
-                greedy = other if greedy is None or (other is not None and other.cost < greedy.cost) else greedy
+            greedy = self.greedy()
+            starts += [] if greedy is None else [greedy]
         self.until = until
         self.limit(inf if self.shorten and self.until is not None else MOST_WORK)
-        if self.best is None or (greedy is not None and greedy.cost < self.best.cost):
-            self.best = greedy
-        if self.best is None:
+        if not starts:
             return
-        random, barren = Random(0), 0
-        self.improve(self.best, random)
+        self.best, random, barren = min(starts, key=lambda one: one.cost), Random(0), 0
+        now = self.best
+        for start in sorted(starts, key=lambda one: one.cost):
+            self.remember(start)
+            if start is now or self.best.cost[0]:
+                self.eased(start)
+        self.improve(now, random)
+        self.eased(self.best)
         while barren < BARREN_ROUNDS and not self.enough(self.best):
             if not self.best.cost[0] and (not self.shorten or self.until is None):
                 break
             cost = self.best.cost
             self.improve(self.disturbed(self.best, random), random)
+            self.eased(self.best)
             barren = 0 if self.best.cost < cost else barren + 1
 
     def enough(self, now: _Sequence) -> bool:
@@ -317,6 +331,47 @@ class _SharingSearch:
         return not late and (
             not self.shorten or makespan <= self.bound or evenly_shared(self.problem, now.work, makespan)
         )
+
+    def eased(self, now: _Sequence) -> None:
+        """Improve a sequence by takeovers on the critical path, always by the best one, and keep the best sequence."""
+        left, seen = MOST_EVEN, set[object]()
+        while True:
+            self.best = min(now, self.best or now, key=lambda one: one.cost)
+            seen.add(now.cost)
+            if self.enough(now) or not left:
+                break
+            shared = SharedSteps(self.problem, _steps_of(now.stretches), self.rules)
+            its = dict.fromkeys(one for _, step, _, _ in now.critical for one in shared.takeovers(step, self.actors))
+            found = (self.taken_over(now, shared, change) for change in islice(its, MOST_TAKEOVERS))
+            others = [one for one in found if one is not None and one.cost not in seen]
+            if not others:
+                break
+            other = min(others, key=lambda one: one.cost)
+            left = MOST_EVEN if other.cost[:2] < now.cost[:2] else left - 1
+            now = other
+
+    def remember(self, now: _Sequence) -> None:
+        """Note the steps of each task of a sequence, so that they are tried for this task in other states."""
+        for number, (task, one) in enumerate(zip(now.tasks, now.stretches, strict=True)):
+            early = frozenset(aim for aim, _ in now.tasks[:number] if not isinstance(aim, Symbol))
+            known = self.known.setdefault((task, early), [])
+            known += [] if one.steps in known else [one.steps]
+
+    def taken_over(self, now: _Sequence, shared: SharedSteps, change: Takeover) -> _Sequence | None:
+        """Return a sequence after a takeover, or None if it is longer or later, or isn't a plan."""
+        self.spend(2 * SCHEDULING * len(shared.primitives))
+        parts = shared.after(change, list(accumulate(len(one.steps) for one in now.stretches)))
+        if parts is None:
+            return None
+        stretches, state = list[_Stretch](), dict(self.problem.initial)
+        for part, one in zip(parts, now.stretches, strict=True):
+            same = one.steps == part and one.before == state
+            stretches.append(one if same else _Stretch(part, state, self.after(state, part)))
+            state = stretches[-1].after
+        found = self.scheduled(now.tasks, stretches)
+        if found is None or found.cost[:2] > now.cost[:2] or validate(self.problem, Plan(_steps_of(stretches))):
+            return None
+        return found
 
     def disturbed(self, now: _Sequence, random: Random) -> _Sequence:
         """Return a sequence after a few changes, whatever they cost."""
@@ -363,10 +418,9 @@ class _SharingSearch:
             steps = renumbered(self.plan.steps[at:upto])
             before, state, at = state, self.after(state, steps), upto
             stretches.append(_Stretch(steps, before, state))
-            self.known[(goal, Crew()), frozenset()] = [steps]
         return self.scheduled([(goal, Crew()) for goal in goals], stretches) if goals else None
 
-    def greedy(self, crews: Sequence[Crew]) -> _Sequence | None:
+    def greedy(self) -> _Sequence | None:
         """Return the greedy sequence of tasks: each goal is assigned to the crew that achieves the goal first.
 
         If no crew achieves a goal, the goal is tried again after the next goal. Return None if no crew achieves a remaining goal.
@@ -377,7 +431,7 @@ class _SharingSearch:
             tasks = [] if now is None else now.tasks
             found: list[_Sequence] = []
             for goal in waiting:
-                found = [one for crew in crews if (one := self.built([*tasks, (goal, crew)], now)) is not None]
+                found = [one for crew in self.crews if (one := self.built([*tasks, (goal, crew)], now)) is not None]
                 if found:
                     waiting.remove(goal)
                     break
@@ -445,13 +499,6 @@ class _SharingSearch:
         """
         early, aim = frozenset(one for one in aims[:-1] if not isinstance(one, Symbol)), aims[-1]
         key = frozenset(state.items()), frozenset(aims), aim, crew
-        if key not in self.stretches and crew.united:
-            apart = replace(crew, united=False)
-            base = self.stretch(state, aims, apart)
-            if base is not None and any(step.joined for step in base.steps):  # an actor can't leave a joint refinement
-                steps = self.planned(replace(self.problem, initial=state, goal=self.wanted(aims)), apart, aim)
-                base = None if steps is None else _Stretch(steps, state, self.after(state, steps))
-            self.stretches[key] = self.united(base, aims)
         if key not in self.stretches:
             problem = replace(self.problem, initial=state, goal=self.wanted(aims))
             known = self.known.setdefault(((aim, crew), early), [])
@@ -465,81 +512,6 @@ class _SharingSearch:
                 known.append(steps)
             self.stretches[key] = None if steps is None else _Stretch(steps, state, self.after(state, steps))
         return self.stretches[key]
-
-    def united(self, stretch: _Stretch | None, aims: Sequence[Aim]) -> _Stretch | None:
-        """Return a stretch in which one actor of a first-level step takes over the primitives of another where this is valid."""
-        if stretch is None:
-            return None
-        steps, resting = stretch.steps, default_actors(self.problem)
-        problem = replace(self.problem, initial=stretch.before, goal=self.wanted(aims))
-        for number, step in enumerate(steps):
-            for giver, taker in permutations(self.actors(step, resting), 2):
-                now = steps[number]
-                if (
-                    giver in now.arguments
-                    or any(one.joined for one in now.walk())
-                    or not {giver, taker} <= set(self.actors(now, resting))
-                ):
-                    continue
-                self.spend(SCHEDULING * len(Plan(steps).primitives))
-                other = self.replayed(
-                    stretch.before, (*steps[:number], self.renamed(now, giver, taker), *steps[number + 1 :])
-                )
-                if other is not None and not validate(problem, Plan(other)):
-                    steps = other
-        return stretch if steps is stretch.steps else _Stretch(steps, stretch.before, self.after(stretch.before, steps))
-
-    def renamed(self, step: Step, old: str, new: str) -> Step:
-        """Return a step whose sub-steps name another individual."""
-
-        def other(one: Step) -> Step:
-            terms = tuple(new if term == old else term for term in one.arguments)
-            return replace(one, arguments=terms, steps=tuple(map(other, one.steps)))
-
-        return replace(step, steps=tuple(map(other, step.steps)))
-
-    def replayed(self, state: State, steps: Sequence[Step]) -> tuple[Step, ...] | None:
-        """Return first-level steps without the primitives that aren't applicable; a primitive may come later in its step.
-
-        Return None if no primitive of a step is applicable.
-        """
-        facts, found = LoggedState(self.problem, state, self.rules), list[Step]()
-        for step in steps:
-            if not step.steps:
-                done, left = [self.done(step, facts)], list[Step]()
-            else:
-                done, left = [], list(step.steps)
-            while left:
-                now = next(
-                    ((i, one) for i, child in enumerate(left) if (one := self.done(child, facts)) is not None), None
-                )
-                if now is None:
-                    break
-                del left[now[0]]
-                done.append(now[1])
-            inside = [one for one in done if one is not None]
-            if not inside:
-                return None
-            found.append(replace(step, steps=tuple(inside)) if step.steps else inside[0])
-        return renumbered(found)
-
-    def done(self, step: Step, facts: LoggedState) -> Step | None:
-        """Return a step with its applicable primitives and their present bindings, and change the facts; None if there are none."""
-        behavior = self.problem.domain.behaviors[step.behavior]
-        if not self.rules.fits(behavior, step.arguments):
-            return None
-        step = replace(step, id=self.problem.id_of(step.behavior, step.arguments))
-        if step.steps:
-            inside = tuple(one for child in step.steps if (one := self.done(child, facts)) is not None)
-            return replace(step, steps=inside) if inside else None
-        given = {p.name: argument for p, argument in zip(behavior.parameters, step.arguments, strict=True)}
-        its = self.rules.satisfied(behavior.preconditions, given, behavior.kinds, facts)
-        changes = None if its is None else self.rules.changes(behavior, step.arguments, facts)
-        if its is None or changes is None:
-            return None
-        for change in changes:
-            facts.put(*change)
-        return replace(step, bindings={name: its.get(f"?{name}", one) for name, one in step.bindings.items()})
 
     def wanted(self, aims: Sequence[Aim]) -> State:
         """Return the goals among the given aims, and the goals that the plan doesn't change, with their values."""
@@ -593,11 +565,12 @@ class _SharingSearch:
     def with_last(self, problem: Problem, call: Call, aim: Aim) -> tuple[Step, ...] | None:
         """Return the steps of a call, followed by the step of the aim if the aim is a step.
 
-        Return None if the step of the aim isn't possible.
+        Return None if the step of the aim isn't possible, or is refined by no steps.
         """
         if not isinstance(aim, Symbol):
-            last = call.refiner.do(problem.domain.behaviors[aim[0]].level, *aim)
-            if last is None:
+            level = problem.domain.behaviors[aim[0]].level
+            last = call.refiner.do(level, *aim)
+            if last is None or not (last.steps or level == problem.domain.levels[-1]):
                 return None
             call.steps.append(last)
         steps = call.tree().steps
@@ -630,7 +603,7 @@ class _SharingSearch:
 
     def scheduled(self, tasks: list[SharedTask], stretches: list[_Stretch]) -> _Sequence | None:
         """Return the sequence of tasks with the earliest schedule of their steps in the given order."""
-        plan = Plan(renumbered(step for one in stretches for step in one.steps))
+        plan = Plan(_steps_of(stretches))
         steps = plan.primitives
         self.spend(SCHEDULING * len(steps))
         try:

@@ -549,10 +549,54 @@ def test_an_actor_takes_over_the_supporting_steps_of_another_actor_that_is_neede
     result = confab.load(tmp_path / "paint.ttl").plan()
     assert result.plan is not None
     fans = [step for step in result.plan.primitives if step.behavior == "FAN_ON"]
-    assert {step.arguments for step in fans} == {
-        (robot, booth) for robot in ("bob", "sue") for booth in ("booth1", "booth2")
-    }
+    assert {step.arguments[0] for step in fans} == {"bob", "sue"}
     assert validate(read(load(tmp_path / "paint.ttl")).problem, result.plan) == []
+
+
+HULL = r'''
+@prefix : <https://example.org/hull#> . @prefix c: <https://w3id.org/confab/core#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> . @prefix xsd: <http://www.w3.org/2001/XMLSchema#> .
+<https://example.org/hull> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> ; c:symbolicOnly true .
+xsd:dayTimeDuration a rdfs:Datatype .
+:Place a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object, :AT .
+:Robot a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object ; c:hasSituationType :AT .
+:Side a owl:Class, owl:NamedIndividual ; rdfs:subClassOf :Place ; c:hasSituationType :PAINTED .
+:Ship a owl:Class, owl:NamedIndividual ; rdfs:subClassOf c:Object ; c:hasSituationType :READY .
+:READY a owl:Class, owl:NamedIndividual, c:SituationType .
+:PAINTED a owl:Class, owl:NamedIndividual, c:SituationType ; c:fromLevel 2 .
+:AT a owl:Class, owl:NamedIndividual, c:SituationType ; c:valueProperty :at ; c:fromLevel 2 .
+:at a owl:ObjectProperty, owl:FunctionalProperty, owl:NamedIndividual ; rdfs:domain :Robot ; rdfs:range :AT .
+:L1_FINISH a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 1 ; c:update """
+  INSERT { ?ship :READY true } WHERE { ?ship a :Ship }""" .
+:DRIVE a owl:NamedIndividual, c:Behavior ; c:level 2 ; c:index 1 ; c:actor :DRIVE.robot ;
+  c:duration "PT1M"^^xsd:dayTimeDuration ; c:update """
+  DELETE { ?robot :at ?from } INSERT { ?robot :at ?to }
+  WHERE { ?robot a :Robot . ?to a :Place . ?robot :at ?from FILTER(?from != ?to) }""" .
+:PAINT a owl:NamedIndividual, c:Behavior ; c:level 2 ; c:index 2 ; c:actor :PAINT.robot ;
+  c:duration "PT10M"^^xsd:dayTimeDuration ; c:update """
+  INSERT { ?side :PAINTED true } WHERE { ?robot a :Robot . ?side a :Side . ?robot :at ?side }""" .
+:LAUNCH a owl:NamedIndividual, c:Behavior ; c:level 2 ; c:index 3 ; c:duration "PT1M"^^xsd:dayTimeDuration ; c:update """
+  INSERT { ?ship :READY true } WHERE { ?ship a :Ship . :port :PAINTED true . :bow :PAINTED true . :stern :PAINTED true .
+    :starboard :PAINTED true }""" .
+:dock a owl:NamedIndividual, :Place ; c:index 1 .
+:port a owl:NamedIndividual, :Side ; c:index 2 . :bow a owl:NamedIndividual, :Side ; c:index 3 .
+:stern a owl:NamedIndividual, :Side ; c:index 4 . :starboard a owl:NamedIndividual, :Side ; c:index 5 .
+:sue a owl:NamedIndividual, :Robot ; c:index 6 ; :at :dock . :sam a owl:NamedIndividual, :Robot ; c:index 7 ; :at :dock .
+:ship a owl:NamedIndividual, :Ship ; c:index 8 .
+[ a owl:AllDifferent ; owl:distinctMembers ( :bow :dock :port :sam :ship :starboard :stern :sue ) ] .
+:task a owl:NamedIndividual, c:Task ; c:goal :task.ship .
+:task.ship a owl:NamedIndividual, c:ValueCondition ; c:about :ship ; c:situationType :READY .
+'''
+"""Robots drive to the four sides of a ship and paint them; this is the refinement of one step towards one goal."""
+
+
+def test_the_parts_of_one_step_are_divided_among_actors(tmp_path: Path) -> None:
+    (tmp_path / "hull.ttl").write_text(HULL)
+    result = confab.load(tmp_path / "hull.ttl").plan(minimise="makespan")
+    assert result.timed is not None
+    assert len(result.timed.plan.steps) == 1
+    assert result.timed.makespan == 2 * (60 + 600) + 60
 
 
 def test_with_a_time_limit_the_goals_are_shared_in_more_ways() -> None:
