@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from confab.reasoner.language import is_variable, plain_variables
 from confab.reasoner.pddl.formulas import Atom, PddlTerm
 from confab.reasoner.pddl.vocabulary import PddlNames
 from confab.reasoner.problem import Problem
@@ -20,59 +21,51 @@ class NegationPredicates:
 
     def __init__(self, problem: Problem, behaviors: Sequence[Behavior], words: PddlNames) -> None:
         self.problem, self.behaviors, self.words = problem, behaviors, words
-        self.contrary: dict[str, set[str]] = {}
-        self.free: dict[tuple[str, str], frozenset[str]] = {}
+        asked: dict[tuple[str, str], frozenset[str]] = {}
         for behavior in behaviors:
-            for condition in behavior.preconditions:
-                if absent := self.absent(condition):
-                    self.keep(behavior, *absent)
+            for kind, situation, value in self.absences(behavior):
+                known = asked.get((kind, situation), frozenset[str]())
+                asked[kind, situation] = known | words.denoted(behavior, value)
+        self.free = {key: values for key, values in asked.items() if self.exclusive(*key, values)}
+        self.contrary: dict[str, set[str]] = {}
+        for (kind, situation), values in asked.items():
+            if (kind, situation) not in self.free:
+                self.contrary.setdefault(situation, set()).update(values)
 
-    def absent(self, condition: Condition) -> tuple[str, str, str] | None:
-        """Return class, situation type and value of a condition "no individual of the class has this value", else None."""
+    def absent(self, behavior: Behavior, condition: Condition) -> tuple[str, str, str] | None:
+        """Return class, situation type and value of a precondition "no individual of the class has this value", else None.
+
+        "No individual of the class has any of these values" isn't such a precondition: the value is local to the condition.
+        """
         match condition:
             case Witness(variable, kind, (ValueCondition(situation, (about,), value, False),), True):
                 known = situation not in self.problem.domain.rules and not self.words.situations[situation].boolean
-                if about == variable != value and known:
+                bound = {p.name for p in behavior.parameters} | plain_variables(behavior.preconditions)
+                if about == variable != value and known and (value in bound or not is_variable(value)):
                     return kind, situation, value
             case _:
                 pass
         return None
 
-    def keep(self, behavior: Behavior, kind: str, situation: str, value: str) -> None:
-        """Record the extra predicate that a negative precondition of a behaviour needs."""
-        if (kind, situation) not in self.free and self.exclusive(kind, situation):
-            self.free[kind, situation] = self.asked(kind, situation)
-        if (kind, situation) not in self.free:
-            self.contrary.setdefault(situation, set()).update(self.members(behavior, value))
+    def absences(self, behavior: Behavior) -> Iterator[tuple[str, str, str]]:
+        """Yield class, situation type and value of the preconditions "no individual of the class has this value"."""
+        yield from (found for one in behavior.preconditions if (found := self.absent(behavior, one)))
 
-    def members(self, behavior: Behavior, term: str) -> frozenset[str]:
-        """Return the individuals that a term of a behaviour can denote."""
-        return self.problem.members(behavior.kinds[term]) if term in behavior.kinds else frozenset((term,))
-
-    def asked(self, kind: str, situation: str) -> frozenset[str]:
-        """Return the values that occur in preconditions "no individual of the class has this value"."""
-        found = frozenset[str]()
-        for behavior in self.behaviors:
-            for absent in map(self.absent, behavior.preconditions):
-                if absent and absent[:2] == (kind, situation):
-                    found |= self.members(behavior, absent[2])
-        return found
-
-    def exclusive(self, kind: str, situation: str) -> bool:
-        """Return whether each value of `asked` can belong to at most one individual of a class at a time."""
-        asked, its = self.asked(kind, situation), self.problem.members(kind)
+    def exclusive(self, kind: str, situation: str, asked: frozenset[str]) -> bool:
+        """Return whether each of some values can belong to at most one individual of a class at a time."""
+        its, denoted = self.problem.members(kind), self.words.denoted
         held = [v for s, v in self.problem.initial.items() if s.situation == situation and s.arguments[0] in its]
         held = [value for value in held if value in asked]
         if len(held) > len(set(held)):
             return False
         for behavior in self.behaviors:
-            empty = {a[2] for a in map(self.absent, behavior.preconditions) if a and a[:2] == (kind, situation)}
+            empty = {a[2] for a in self.absences(behavior) if a[:2] == (kind, situation)}
             filling = [
                 effect
                 for effect in behavior.effects
                 if effect.situation == situation
-                and self.members(behavior, effect.arguments[0]) & its
-                and self.members(behavior, effect.value) & asked
+                and denoted(behavior, effect.arguments[0]) & its
+                and denoted(behavior, effect.value) & asked
             ]
             if len(filling) > 1 or any(effect.when or effect.value not in empty for effect in filling):
                 return False

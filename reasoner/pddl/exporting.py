@@ -119,10 +119,9 @@ class _Export:
     def __init__(self, problem: Problem, level: int) -> None:
         self.problem, self.words = problem, PddlNames(problem)
         self.lowering = Lowering(problem, problem.domain.at_level(level), self.words)
-        cases = [case for behavior in problem.domain.at_level(level) for case in self.lowering.cases(behavior)]
         self.actions = {
             self.words.name("action", f"{number} {action.behavior.name}", action.behavior.name): action
-            for number, action in enumerate(map(self.lowering.action, cases))
+            for number, action in enumerate(map(self.lowering.action, self.lowering.cases))
             if action is not None
         }
         self.derived = list(self.lowering.derived()) if self.lowering.recursive else []

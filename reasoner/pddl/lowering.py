@@ -70,7 +70,8 @@ Terms = Mapping[str, PddlTerm]
 CASES = 4
 """A conditional effect on a symbol is split into one action per value only if the symbol has at most this many other values."""
 MOST_CASES = 64
-"""Maximum number of actions into which a behaviour is split by the individuals that several effects on amounts may concern."""
+"""Maximum number of actions into which a behaviour is split by the values that the conditions of its effects require; and, for each
+of these actions, by the individuals that several effects on amounts may concern."""
 APART = (
     "the effects may concern the same individual, and PDDL can't combine them; state by inequality conditions which individuals "
     "are different to export the behaviour"
@@ -110,6 +111,15 @@ class ActionScope:
 
 
 @dataclass(frozen=True)
+class LoweredCondition:
+    """The condition of an effect: the condition's own variables, all terms by their names in the scene, and the formula."""
+
+    own: tuple[PddlTerm, ...]
+    terms: Terms
+    holds: Formula
+
+
+@dataclass(frozen=True)
 class LoweredEffect:
     """An effect on one symbol: the symbol's arguments, the new value, the effect's condition, and the condition's own variables."""
 
@@ -123,15 +133,16 @@ class Lowering:
     """Translation of the conditions and behaviours of one level to formulas and actions."""
 
     def __init__(self, problem: Problem, behaviors: Sequence[Behavior], words: PddlNames) -> None:
-        self.problem, self.behaviors, self.words = problem, behaviors, words
+        self.problem, self.words = problem, words
         self.rules = problem.domain.rules
         self.recursive = circular(self.rules)
-        self.kept = NegationPredicates(problem, behaviors, words)
         changed = {effect.situation for behavior in behaviors for effect in behavior.amounts}
         scaled = {
             e.situation for one in behaviors for e in one.amounts if e.operation == "scale" and situations_in(e.amount)
         }
         self.judged_later = sorted((changed & problem.domain.aggregates.keys()) | scaled)
+        self.cases = [case for behavior in behaviors for case in self.cases_of(behavior)]
+        self.kept = NegationPredicates(problem, self.cases, words)
 
     # ------------------------------------------------------------------------------------------------- conditions
 
@@ -206,11 +217,11 @@ class Lowering:
 
     # ---------------------------------------------------------------------------------------------------- actions
 
-    def cases(self, behavior: Behavior) -> Iterator[Behavior]:
+    def cases_of(self, behavior: Behavior, most: int = MOST_CASES) -> Iterator[Behavior]:
         """Yield behaviours that together are equivalent to a behaviour: one for each case of the behaviour's conditional effects.
 
         An effect on a value is split only if its condition states the value of a single symbol that has at most `CASES` other
-        values. For effects on amounts, see `added`.
+        values, and only into at most `most` cases. For effects on amounts, see `added`.
         """
         for effect in behavior.effects:
             match effect.when:
@@ -224,18 +235,17 @@ class Lowering:
                         value in mentions(c) for e in behavior.every_effect if when not in e.when for c in e.when
                     ):
                         continue  # another effect has a variable of its own with this name
-                    others = sorted(self.range_of(situation) - self.kept.members(behavior, value))
-                    if len(others) <= CASES:
+                    others = sorted(self.range_of(situation) - self.words.denoted(behavior, value))
+                    if len(others) <= CASES and len(others) < most:
+                        fewer = most // (len(others) + 1)
                         left = tuple(one for one in behavior.effects if when not in one.when)
                         made = tuple(
                             replace(one, when=tuple(c for c in one.when if c != when)) for one in behavior.effects
                         )
-                        yield from self.cases(
-                            replace(behavior, preconditions=(*behavior.preconditions, when), effects=made)
-                        )
+                        yield from self.cases_of(replace(_asking(behavior, when), effects=made), fewer)
                         for other in others:
-                            asked = (*behavior.preconditions, replace(when, value=other))
-                            yield from self.cases(replace(behavior, preconditions=asked, effects=left))
+                            asking = _asking(behavior, replace(when, value=other))
+                            yield from self.cases_of(replace(asking, effects=left), fewer)
                         return
                 case _:
                     continue
@@ -286,13 +296,13 @@ class Lowering:
     def distinct(self, behavior: Behavior, one: str, other: str) -> bool:
         """Return whether two different terms of a behaviour denote different individuals."""
         apart = {EqualityCondition(one, other, True), EqualityCondition(other, one, True)}
-        return not apart.isdisjoint(behavior.preconditions) or self.kept.members(behavior, one).isdisjoint(
-            self.kept.members(behavior, other)
+        return not apart.isdisjoint(behavior.preconditions) or self.words.denoted(behavior, one).isdisjoint(
+            self.words.denoted(behavior, other)
         )
 
     def total(self, behavior: Behavior, situation: str, arguments: Sequence[str]) -> bool:
         """Return whether the symbols of a situation type exist for all individuals that the arguments can denote."""
-        terms = [PddlTerm(argument, "object", self.kept.members(behavior, argument)) for argument in arguments]
+        terms = [PddlTerm(argument, "object", self.words.denoted(behavior, argument)) for argument in arguments]
         return self.words.total(situation, terms)
 
     def action(self, behavior: Behavior) -> LoweredAction | None:
@@ -311,11 +321,13 @@ class Lowering:
                 case _:
                     pass
         for condition in behavior.asked:
-            if absent := self.kept.absent(condition):
+            if absent := self.kept.absent(behavior, condition):
                 scope.needs += self.absences(*absent, terms)
             else:
                 self.need(condition, terms, scope)
         cost = self.cost(behavior, terms, scope)
+        if behavior.lasting in behavior.preconditions and behavior.timing and behavior.timing.duration is not None:
+            self.not_negative(behavior.timing.duration, terms, scope)
         changes = [*self.value_changes(behavior, terms, scope), *self.amount_changes(behavior, terms, scope)]
         needs = both([*scope.needs, *self.within_bounds(scope)])
         if needs == NEVER or not changes or not all(term.members for term in scope.parameters):
@@ -377,18 +389,22 @@ class Lowering:
         scope.needs.append(self.formula(condition, terms, scope))
 
     def cost(self, behavior: Behavior, terms: Terms, scope: ActionScope) -> NumericTerm:
-        """Return the cost of an action, and add the precondition that the cost is a number of at least 0.
+        """Return the cost of an action, and add the precondition that the cost is a number of at least 0."""
+        if behavior.price is None:
+            return Fraction(repr(float(behavior.cost)))
+        return self.not_negative(behavior.price, terms, scope)
+
+    def not_negative(self, expression: Expression, terms: Terms, scope: ActionScope) -> NumericTerm:
+        """Return the PDDL expression for a numeric expression, and add the precondition that it is a number of at least 0.
 
         A static predicate expresses that the numbers exist, since not every planner with action costs supports numeric
         comparisons.
         """
-        if behavior.price is None:
-            return Fraction(repr(float(behavior.cost)))
-        scope.needs += self.words.there(behavior.price, terms)
-        price = self.words.number(behavior.price, terms)
-        if not self.positive(behavior.price):
-            scope.needs.append(Compare(">=", price, Fraction(0)))
-        return price
+        scope.needs += self.words.there(expression, terms)
+        number = self.words.number(expression, terms)
+        if not self.positive(expression):
+            scope.needs.append(Compare(">=", number, Fraction(0)))
+        return number
 
     def positive(self, expression: Expression) -> bool:
         """Return whether a numeric expression is never negative."""
@@ -405,19 +421,23 @@ class Lowering:
 
     # ---------------------------------------------------------------------------------------------------- effects
 
-    def cell(self, effect: ValueEffect | AmountEffect, terms: Terms, scope: ActionScope) -> tuple[LoweredEffect, Terms]:
-        """Return the symbol that an effect changes, and a mapping of the effect's variables to PDDL terms."""
+    def when(self, effect: ValueEffect | AmountEffect, terms: Terms, scope: ActionScope) -> LoweredCondition:
+        """Return the condition of an effect."""
         own, inside = self.bound(effect.when, terms, scope)
-        its = self.words.terms(effect.arguments, inside)
-        when = [self.words.guard(inside[name], scope.kinds[name]) for name in own]
-        when += [self.formula(condition, inside, scope) for condition in effect.when]
-        when.append(self.words.exists(effect.situation, its))
-        value = self.words.terms((effect.value,), inside)[0] if isinstance(effect, ValueEffect) else None
-        return LoweredEffect(tuple(inside[name] for name in own), both(when), its, value), inside
+        parts = [self.words.guard(inside[name], scope.kinds[name]) for name in own]
+        parts += [self.formula(condition, inside, scope) for condition in effect.when]
+        return LoweredCondition(tuple(inside[name] for name in own), inside, both(parts))
+
+    def cell(self, effect: ValueEffect | AmountEffect, when: LoweredCondition) -> LoweredEffect:
+        """Return an effect with the symbol that it changes."""
+        its = self.words.terms(effect.arguments, when.terms)
+        value = self.words.terms((effect.value,), when.terms)[0] if isinstance(effect, ValueEffect) else None
+        return LoweredEffect(when.own, both([when.holds, self.words.exists(effect.situation, its)]), its, value)
 
     def value_changes(self, behavior: Behavior, terms: Terms, scope: ActionScope) -> Iterator[ConditionalEffect]:
         """Yield the PDDL effects of a behaviour on values; if two effects change one symbol, the later one takes precedence."""
-        cells = [(effect, *self.cell(effect, terms, scope)) for effect in behavior.effects]
+        whens = [self.when(effect, terms, scope) for effect in behavior.effects]
+        cells = [(e, self.cell(e, when), when.terms) for e, when in zip(behavior.effects, whens, strict=True)]
         for number, (effect, cell, inside) in enumerate(cells):
             if self.words.situations[effect.situation].boolean:
                 atom = self.words.value(effect.situation, cell.terms, None)
@@ -489,8 +509,11 @@ class Lowering:
         apply several such effects in sequence.
         """
         groups: dict[tuple[str, FunctionTerm, Formula, tuple[PddlTerm, ...]], list[tuple[str, NumericTerm]]] = {}
+        whens = dict[tuple[Condition, ...], LoweredCondition]()  # effects with one condition have the same variables
         for effect in behavior.amounts:
-            cell, inside = self.cell(effect, terms, scope)
+            if effect.when not in whens:
+                whens[effect.when] = self.when(effect, terms, scope)
+            cell, inside = self.cell(effect, whens[effect.when]), whens[effect.when].terms
             if cell.when != NEVER:
                 self.check_whole(behavior, effect)
                 there = both(self.words.there(effect.amount, inside))

@@ -13,7 +13,7 @@ from confab.reasoner.pddl.formulas import FALSE as NEVER
 from confab.reasoner.pddl.formulas import TRUE as ALWAYS
 from confab.reasoner.pddl.formulas import Arithmetic, Atom, Formula, FunctionTerm, NumericTerm, PddlTerm, both
 from confab.reasoner.problem import Problem
-from confab.reasoner.symbols import TRUE, Witness
+from confab.reasoner.symbols import TRUE, Behavior, Witness
 
 WORLD = "World"
 """Class whose only individual is the argument of each symbol that has no argument in PDDL."""
@@ -93,6 +93,10 @@ class PddlNames:
         """Return the PDDL object for an individual."""
         return PddlTerm(self.name("object", ours), self.lowest.get(ours, "object"), frozenset((ours,)))
 
+    def denoted(self, behavior: Behavior, term: str) -> frozenset[str]:
+        """Return the individuals that a term of a behaviour can denote."""
+        return self.problem.members(behavior.kinds[term]) if term in behavior.kinds else frozenset((term,))
+
     # ----------------------------------------------------------------------------------------------------- predicates
 
     def atom(self, predicate: str, terms: Sequence[PddlTerm]) -> Atom:
@@ -136,10 +140,10 @@ class PddlNames:
 
         The formula for "different from an individual" uses a predicate instead of PDDL's equality.
         """
+        name = self.name("predicate", "different individuals", "different")
         rows = frozenset((one, other) for one in term.members for other in constant.members - {one})
-        found = self.static(
-            "different", "different", rows | self.statics.get("different", frozenset()), (term, constant)
-        )
+        rows |= self.statics.get(name, frozenset())
+        found = self.static("different individuals", "different", rows, (term, constant))
         return found if term.members & constant.members else ALWAYS
 
     def static(self, ours: str, wanted: str, rows: frozenset[tuple[str, ...]], terms: Sequence[PddlTerm]) -> Formula:

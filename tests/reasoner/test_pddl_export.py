@@ -15,7 +15,7 @@ from confab.planner.plan import Status
 from confab.reasoner.aggregates.compiling import compiled
 from confab.reasoner.aggregates.dependencies import unfolded
 from confab.reasoner.aggregates.totals import with_totals
-from confab.reasoner.amounts import Amount, Quantity
+from confab.reasoner.amounts import Amount, Measure, Quantity
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import OutOfTimeError
 from confab.reasoner.pddl.exporting import to_pddl
@@ -28,11 +28,15 @@ from confab.reasoner.symbols import (
     AmountEffect,
     Behavior,
     Comparison,
+    Condition,
     EqualityCondition,
     Parameter,
+    RelationCondition,
     Rule,
     SituationType,
+    Span,
     Symbol,
+    Timing,
     ValueCondition,
     ValueEffect,
     Witness,
@@ -171,6 +175,7 @@ def problem_of(
         "Thing": (names("a"), names("b")),
         "Place": (names("m"), names("n"), names("o")),
         "Empty": (),
+        "Edge": (names("o"),),
         "Truth": (TRUE, FALSE),
     }
     initial = {Symbol("AT", (names("a"),)): names("m"), Symbol("AT", (names("b"),)): names("n")}
@@ -195,7 +200,9 @@ ANY_PLACE = Behavior(
         ValueEffect("AT", ("b",), "m", (at("b", "?p"),)),
     ),
 )
+NONE_AT_AN_EDGE = Witness("?z", "Thing", (at("?z", "?e"),), negated=True)
 JUMP = Behavior("JUMP", 1, (THING, PLACE), (), (), (ValueEffect("AT", ("?x",), "?p"),))
+EMPTY = AmountEffect("LOAD", ("a",), "assign", Fraction(0))
 SWAP = Behavior(
     "SWAP",
     1,
@@ -224,6 +231,8 @@ SWAP = Behavior(
         ([JUMP, replace(SWAP, preconditions=(*SWAP.preconditions, Witness("?e", "Empty", ())))], 2.0),
         ([replace(JUMP, preconditions=(ValueCondition("LIT", ("?x",), FALSE),), effects=(*JUMP.effects, LIGHT))], 2.0),
         ([replace(JUMP, amounts=(AmountEffect("LOAD", ("?x",), "assign", Amount("LOAD", ("a",))),))], 2.0),
+        ([replace(JUMP, variables=(Parameter("?e", "Edge"),), preconditions=(NONE_AT_AN_EDGE,))], 2.0),
+        ([replace(JUMP, amounts=(replace(EMPTY, when=(PLACE_IS_FREE,)), replace(EMPTY, operation="scale")))], 2.0),
     ],
 )  # fmt: skip
 def test_an_exported_behaviour_keeps_its_meaning(behaviors: list[Behavior], cost: float) -> None:
@@ -263,6 +272,44 @@ def test_effects_that_may_change_one_amount_are_one_effect_of_an_exported_action
             (one,) = [found for found in simulator.get_applicable_actions(first) if {*map(str, found[1])} == {"a"}]
             after = simulator.apply(first, *one)
     assert {str(symbol): after.get_value(symbol).constant_value() for symbol in task.initial_values}["load(a)"] == load
+
+
+FARE = Measure("fare", ("?p",))
+HERE, ANY_HERE = at("?x", "?p"), Witness("?z", "Place", (at("?x", "?z"),))
+
+
+@pytest.mark.parametrize(("by", "when"), [(FARE, HERE), (Fraction(1), ANY_HERE)])
+def test_the_bounds_of_an_amount_limit_the_sum_of_effects_with_one_condition(
+    by: Fraction | Measure, when: Condition
+) -> None:
+    pay = AmountEffect("LOAD", ("?x",), "increase", by, (when,))
+    problem = problem_of(
+        Behavior("PAY", 1, (THING,), (Parameter("?p", "Place"),), (), (LIGHT,), amounts=(pay, replace(pay)))
+    )
+    problem = replace(problem, relations={"fare": frozenset({("m", "1"), ("n", "1")})})
+    for most, cost in ((2, None), (3, 1.0)):
+        kinds = {**problem.domain.situations, "LOAD": replace(LOAD, quantity=Quantity(most=Fraction(most)))}
+        limited = replace(problem, domain=replace(problem.domain, situations=kinds), goal={Symbol("LIT", ("a",)): TRUE})
+        assert least(limited) == least(round_trip(limited)) == cost
+
+
+def test_an_exported_behaviour_needs_its_calculated_duration() -> None:
+    far = Measure("far", ("?x", "?p"))
+    condition = Comparison(far, ">=", Fraction(0))
+    drive = replace(JUMP, preconditions=(condition,), timing=Timing(far, (), ((Span.START, condition),), ()))
+    problem = replace(problem_of(drive), relations={"far": frozenset({("a", "n", "1"), ("b", "m", "-1")})})
+    assert least(problem) is least(round_trip(problem)) is None
+    problem = replace(problem, relations={"far": frozenset({("a", "n", "1"), ("b", "m", "0")})})
+    assert least(problem) == least(round_trip(problem)) == 2.0
+
+
+def test_many_conditional_effects_become_a_limited_number_of_actions() -> None:
+    things = tuple(f"t{i}" for i in range(8))
+    fall = behavior("FALL", 1, "", [], [ValueEffect("AT", (one,), "o", (at(one, "m"),)) for one in things])
+    classes = {"Thing": things, "Place": ("m", "n", "o")}
+    problem = world([AT], [fall], classes, {f"AT {one}": "m" for one in things}, {f"AT {one}": "o" for one in things})
+    assert len(to_pddl(problem).actions) <= 64
+    assert least(problem) == least(round_trip(problem)) == 1.0
 
 
 def test_an_exported_amount_has_a_value_for_each_object_that_its_function_accepts() -> None:
@@ -330,6 +377,16 @@ def test_names_that_pddl_can_not_distinguish_or_read_are_changed(names: Callable
     exported = to_pddl(problem)
     assert set(exported.objects.values()) == {names(name) for name in "abmno"}
     assert least(round_trip(problem)) == 2.0
+
+
+def test_a_relation_with_the_name_of_the_predicate_for_different_individuals_keeps_its_meaning() -> None:
+    related = RelationCondition("different", ("?x", "?p"))
+    behaviors = [
+        replace(JUMP, name=f"JUMP{i}", preconditions=(related, at("?x", one, True))) for i, one in enumerate("mn")
+    ]
+    problem = replace(problem_of(*behaviors), relations={"different": frozenset({("a", "n"), ("b", "m"), ("a", "m")})})
+    problem = replace(problem, goal={Symbol("AT", ("b",)): "m"})
+    assert least(problem) == least(round_trip(problem)) == 1.0
 
 
 def test_an_export_ends_by_the_deadline() -> None:
