@@ -141,6 +141,12 @@ class Lowering:
             e.situation for one in behaviors for e in one.amounts if e.operation == "scale" and situations_in(e.amount)
         }
         self.judged_later = sorted((changed & problem.domain.aggregates.keys()) | scaled)
+        given: dict[str, set[str]] = {}
+        for symbol, value in problem.initial.items():
+            given.setdefault(symbol.situation, set()).add(value)
+        for one, effect in ((behavior, effect) for behavior in behaviors for effect in behavior.effects):
+            given.setdefault(effect.situation, set()).update(words.denoted(one, effect.value))
+        self.given = {situation: frozenset(values) for situation, values in given.items()}
         self.cases = [case for behavior in behaviors for case in self.cases_of(behavior)]
         self.kept = NegationPredicates(problem, self.cases, words)
 
@@ -351,9 +357,8 @@ class Lowering:
         return scope.values[situation, its]
 
     def range_of(self, situation: str) -> frozenset[str]:
-        """Return the values that symbols of a situation type can have."""
-        initial = {value for symbol, value in self.problem.initial.items() if symbol.situation == situation}
-        return self.problem.members(self.words.situations[situation].range) | initial
+        """Return the values that symbols of a situation type can have, as initial values or by the effects of the behaviours."""
+        return self.problem.members(self.words.situations[situation].range) | self.given.get(situation, frozenset())
 
     def absences(self, kind: str, situation: str, value: str, terms: Terms) -> Iterator[Formula]:
         """Yield the atoms of the extra predicates for a precondition "no individual of the class has this value"."""

@@ -379,6 +379,14 @@ def test_names_that_pddl_can_not_distinguish_or_read_are_changed(names: Callable
     assert least(round_trip(problem)) == 2.0
 
 
+def test_an_exported_effect_may_give_a_value_of_a_wider_class() -> None:
+    leave = Behavior("LEAVE", 1, (Parameter("?v", "Wide"),), effects=(ValueEffect("AT", ("a",), "?v"),))
+    lit = Behavior("LIT", 1, (THING,), (), (at("?x", "m", negated=True), at("?x", "n", negated=True)), (LIGHT,))
+    problem = replace(problem_of(leave, lit), goal={Symbol("LIT", ("a",)): TRUE})
+    problem = replace(problem, classes={**problem.classes, "Place": ("m", "n"), "Wide": ("n", "away")})
+    assert least(problem) == least(round_trip(problem)) == 2.0
+
+
 def test_a_relation_with_the_name_of_the_predicate_for_different_individuals_keeps_its_meaning() -> None:
     related = RelationCondition("different", ("?x", "?p"))
     behaviors = [
