@@ -16,7 +16,8 @@ from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import TRUE, Behavior, Witness
 
 WORLD = "World"
-"""Class whose only individual is the argument of each symbol that has no argument in PDDL."""
+"""Class whose only individual is the argument of each symbol that has no argument in PDDL. The individual is an argument in PDDL,
+too, if a term of a wider class can denote it, because the symbol doesn't exist for the other individuals of that class."""
 RESERVED = """
 all always and assign at-end at-most-once at-start constants decrease define derived domain effect either end
 exists forall goal hold-after hold-during imply increase init is-violated maximize metric minimize not number
@@ -47,7 +48,10 @@ class PddlNames:
         self.existing: dict[str, set[tuple[str, ...]]] = {}
         for symbol in problem.initial:
             self.existing.setdefault(symbol.situation, set()).add(symbol.arguments)
-        self.types, self.above = self._types()
+        kinds = self._kinds()
+        world = problem.members(WORLD)
+        self.one_world = len(world) == 1 and not any(world < problem.members(kind) for kind in kinds)
+        self.types, self.above = self._types(kinds)
         large_first = sorted(self.types, key=lambda kind: -len(problem.members(kind)))
         self.lowest = {member: self.types[kind] for kind in large_first for member in problem.members(kind)}
 
@@ -64,16 +68,20 @@ class PddlNames:
 
     # --------------------------------------------------------------------------------------------------------- types
 
-    def _types(self) -> tuple[dict[str, str], dict[str, str]]:
-        """Return the PDDL types of classes, and their supertypes; of partially overlapping classes, only the larger has a type."""
+    def _kinds(self) -> list[str]:
+        """Return the classes of all terms, and of the arguments of amounts."""
         domain = self.problem.domain
         behaviors = [*domain.behaviors.values(), *(rule.behavior for its in domain.rules.values() for rule in its)]
         kinds = [term.kind for one in behaviors for term in (*one.parameters, *one.variables)]
         conditions = [part for one in behaviors for condition in one.conditions for part in walk(condition)]
         kinds += [part.kind for part in conditions if isinstance(part, Witness)]
         kinds += [kind for one in domain.situations.values() for kind in one.arguments if one.quantity is not None]
+        return list(dict.fromkeys(kinds))
+
+    def _types(self, kinds: Sequence[str]) -> tuple[dict[str, str], dict[str, str]]:
+        """Return the PDDL types of classes, and their supertypes; of partially overlapping classes, only the larger has a type."""
         chosen: dict[frozenset[str], str] = {}
-        for kind in sorted(dict.fromkeys(kinds), key=lambda one: -len(self.problem.members(one))):
+        for kind in sorted(kinds, key=lambda one: -len(self.problem.members(one))):
             members = self.problem.members(kind)
             if members and all(not members & other or members <= other for other in chosen):
                 chosen.setdefault(members, kind)
@@ -107,8 +115,7 @@ class PddlNames:
     def about(self, situation: str, terms: Sequence[PddlTerm]) -> tuple[PddlTerm, ...]:
         """Return the arguments of a symbol, except the individual that stands for the world."""
         kinds = self.situations[situation].arguments
-        one = len(self.problem.classes.get(WORLD, ())) == 1
-        return tuple(term for kind, term in zip(kinds, terms, strict=True) if not (one and kind == WORLD))
+        return tuple(term for kind, term in zip(kinds, terms, strict=True) if not (self.one_world and kind == WORLD))
 
     def value(self, situation: str, terms: Sequence[PddlTerm], value: PddlTerm | None) -> Atom:
         """Return the atom which states that a symbol has a value or, if `value` is None, that a boolean symbol is true."""

@@ -387,6 +387,21 @@ def test_an_exported_effect_may_give_a_value_of_a_wider_class() -> None:
     assert least(problem) == least(round_trip(problem)) == 2.0
 
 
+@pytest.mark.parametrize(("the_world", "cost"), [("a", 1.0), ("w", None)])
+def test_a_fact_about_the_world_is_not_about_other_individuals(the_world: str, cost: float | None) -> None:
+    sunny = ValueCondition("SKY", ("?x",), "m")
+    problem = problem_of(Behavior("LIGHT", 1, (Parameter("?x", "Any"),), (), (sunny,), (LIGHT,)))
+    kinds = {**problem.domain.situations, "SKY": SituationType("SKY", ("World",), "Place")}
+    problem = replace(
+        problem,
+        domain=replace(problem.domain, situations=kinds),
+        classes={**problem.classes, "World": (the_world,), "Any": ("a", "b", "w")},
+        initial={**problem.initial, Symbol("SKY", (the_world,)): "m"},
+        goal={Symbol("LIT", ("a",)): TRUE},
+    )
+    assert least(problem) == least(round_trip(problem)) == cost
+
+
 def test_a_relation_with_the_name_of_the_predicate_for_different_individuals_keeps_its_meaning() -> None:
     related = RelationCondition("different", ("?x", "?p"))
     behaviors = [
