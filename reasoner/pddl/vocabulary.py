@@ -148,7 +148,9 @@ class PddlNames:
         The formula for "different from an individual" uses a predicate instead of PDDL's equality.
         """
         name = self.name("predicate", "different individuals", "different")
-        rows = frozenset((one, other) for one in term.members for other in constant.members - {one})
+        rows: frozenset[tuple[str, ...]] = frozenset(
+            (one, other) for one in term.members for other in constant.members - {one}
+        )
         rows |= self.statics.get(name, frozenset())
         found = self.static("different individuals", "different", rows, (term, constant))
         return found if term.members & constant.members else ALWAYS
