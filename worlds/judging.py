@@ -47,7 +47,7 @@ from worlds.slices import Slice
 from worlds.walking import cost, executed, faults
 from worlds.wishes import WEIGHTS, choices, least_costs, least_total, softened
 
-SECONDS, CPU, PROVING, COMPARING = 1.5, 3.0, 15.0, 30.0
+SECONDS, CPU, PROVING, COMPARING = 1.5, 4.0, 15.0, 30.0
 """Time limit of a call in seconds; CPU seconds after which a call counts as endless; the same for a search for one certificate,
 whose number of tests is limited instead of its time, and for a comparison with exhaustive searches."""
 MOST = 5_000

@@ -72,6 +72,8 @@ def without(one: Behavior, other: Behavior) -> Behavior | None:
     """Return what a behaviour adds to another behaviour that it extends, or None if it lacks a part of the other one."""
     parts = ("parameters", "variables", "preconditions", "effects", "amounts")
     mine, its = ([getattr(each, part) for part in parts] for each in (one, other))
+    written = set[str]().union(*map(_names, other.conditions))
+    its[1] = tuple(variable for variable in its[1] if variable.name in written)
     mine[1] = (*its[1], *(variable for variable in mine[1] if variable not in its[1]))
     if any(part[: len(less)] != less for part, less in zip(mine, its, strict=True)):
         return None
