@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from confab.planner.acting.schedule import WorkerSlot
-from confab.planner.plan import Plan, Reason, Step
-from confab.planner.timed.call import Timed, in_time
+from confab.planner.plan import Plan, Reason, Step, renumbered
+from confab.planner.timed.call import Timed, best_in_time, in_time
 from confab.planner.timed.dispatch import Dispatch
 from confab.planner.timed.plan import TimedPlan
 from confab.reasoner.problem import Problem
@@ -79,8 +79,12 @@ def remaining(
     together: Concurrency,
     free: int,
     happened: Container[str],
+    seconds_for_others: float | None,
 ) -> Remaining | Reason:
     """Return the dispatch of steps that are applicable one after another, or the reason why they have no schedule.
+
+    If no schedule of the steps keeps all windows and deadlines, other steps for the same goals are sought that have one, for
+    example steps with other actors. Only if none are found, deadlines are given up.
 
     Parameters
     ----------
@@ -95,6 +99,8 @@ def remaining(
         The number of the first external event that happens meanwhile and isn't one of the steps.
     happened : container of str
         The behaviours of executed primitives.
+    seconds_for_others : float, optional
+        Time limit of the search for other steps, on the clock of the computer; 0 if some of the steps have begun.
     """
     primitives, every = Plan(steps).primitives, problem.times or Times()
     times = later(every, seconds)
@@ -105,7 +111,14 @@ def remaining(
     flat = Plan(tuple(replace(step, path=(number,)) for number, step in enumerate(primitives)))
     found, given_up = Timed(together.schedule), tuple[Symbol, ...]()
     if together.schedule is None or [*map(_kind, together.schedule.plan.primitives)] != [*map(_kind, primitives)]:
-        found, given_up = _scheduled(replace(problem, times=times), flat)
+        asked = replace(problem, times=times)
+        found = _in_time(asked, flat)
+        if found.plan is None and seconds_for_others != 0:
+            others = best_in_time(asked, Plan(steps), seconds_for_others, shorten=False).plan
+            if others is not None:
+                found, steps = Timed(others), renumbered(others.plan.steps, free)
+        if found.plan is None:
+            found, given_up = _without_deadlines(asked, flat, found)
     if found.plan is None:
         return found.reason or Reason("the remaining steps have no schedule")
     scheduled = found.plan.plan.primitives
@@ -130,19 +143,21 @@ def _with_events(steps: tuple[Step, ...], scheduled: Sequence[Step], free: int) 
     return steps
 
 
-def _scheduled(problem: Problem, plan: Plan) -> tuple[Timed, tuple[Symbol, ...]]:
-    """Schedule the primitives of a plan; give up no deadline, else one deadline, else all deadlines."""
+def _in_time(problem: Problem, plan: Plan) -> Timed:
+    """Schedule the primitives of a plan; without deadlines and windows, the first schedule suffices."""
     times = problem.times or Times()
-    first = Timed()
-    for given_up in ((), *((goal,) for goal in times.deadlines), tuple(times.deadlines)):
+    return in_time(problem, plan, None if times.deadlines or times.windows else 0.0, same_actors=True)
+
+
+def _without_deadlines(problem: Problem, plan: Plan, late: Timed) -> tuple[Timed, tuple[Symbol, ...]]:
+    """Schedule the primitives of a plan that are late, and give up one deadline, else all deadlines."""
+    times = problem.times or Times()
+    for given_up in (*((goal,) for goal in times.deadlines), tuple(times.deadlines)) if times.deadlines else ():
         kept = {goal: by for goal, by in times.deadlines.items() if goal not in given_up}
-        asked = replace(problem, times=replace(times, deadlines=kept))
-        searched = None if kept or times.windows else 0.0
-        found = in_time(asked, plan, searched, same_actors=True)
+        found = _in_time(replace(problem, times=replace(times, deadlines=kept)), plan)
         if found.plan is not None:
             return found, given_up
-        first = first if first.reason else found
-    return first, ()
+    return late, ()
 
 
 def in_order(slots: Sequence[WorkerSlot]) -> list[tuple[int, bool]]:

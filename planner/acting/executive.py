@@ -45,6 +45,7 @@ from confab.planner.acting.unreached import blamed, blocked, unrestored, with_di
 from confab.planner.acting.world import INTERRUPTED, WITHOUT_EFFECT, Guarded, Verdict, World, WorldError, WorldReport
 from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, SoftGoal, Status, Step, renumbered
+from confab.planner.plan_costs import cost_of
 from confab.planner.timed.activities import InapplicableError, StepSimulation
 from confab.planner.timed.pieces import actors_of_step, default_actors
 from confab.planner.validation import followed, open_goals, unmet_goals
@@ -344,12 +345,18 @@ class _RunningEpisode:
         assert self.together is not None
         now, steps = Fraction(self.world.seconds), self.agenda.steps
         happened = {event.step.behavior for event in self.record.events}
-        found = remaining(self.belief.task, steps, now, self.together, self.free(), happened)
+        limits, begin = self.retries.policy.planning, perf_counter()
+        end = begin if any(step.path in self.agenda.begun for step in steps) else limits.end()
+        left = None if end is None else end - begin
+        found = remaining(self.belief.task, steps, now, self.together, self.free(), happened, left)
         if isinstance(found, Reason):
             self.together = None
             if self.by_the_clock:  # one primitive after another would ignore windows and events
                 self.give_up(found)
             return None
+        if min(step.path[0] for step in found.steps) > max(step.path[0] for step in steps):
+            why, cost = "the steps had no schedule", cost_of(self.belief.task, Plan(found.steps))
+            self.change_plan("replan", why, steps, found.steps, cost, perf_counter() - begin)
         self.agenda.steps = found.steps
         for goal in found.given_up:
             self.tell_late(goal, now)
@@ -588,12 +595,17 @@ class _RunningEpisode:
             self.on_no_plan(found.outcome, limits.until(end))
             return
         self.agenda.steps = self.agenda.numbered(steps, record.done)
+        self.change_plan(found.kind, why, old, self.agenda.steps, found.cost, seconds)
+
+    def change_plan(
+        self, kind: str, why: str, old: tuple[Step, ...], steps: tuple[Step, ...], cost: float, seconds: float
+    ) -> None:
+        """Record that other steps replace steps of the plan, unless their primitives are the same."""
         dropped, added = difference(old, steps)
         if dropped or added:
-            last = record.events[-1].step.path if record.events else ()
-            change = Replan(last, found.kind, why, self.agenda.steps, found.cost, dropped, added, seconds)
-            record.replans.append(change)
-            self.say(found.kind, text=why)
+            last = self.record.events[-1].step.path if self.record.events else ()
+            self.record.replans.append(Replan(last, kind, why, steps, cost, dropped, added, seconds))
+            self.say(kind, text=why)
 
     @property
     def eligible(self) -> dict[Symbol, str]:

@@ -199,6 +199,22 @@ def test_new_steps_of_an_episode_take_place_beside_external_events(seconds: int,
     assert executed(execution) == [*worked, *happened]
 
 
+LIGHT = """
+:LIGHT a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 1 ; c:actor :LIGHT.worker ; c:duration "PT10S"^^xsd:dayTimeDuration ;
+  c:update "INSERT { ?switch :ON true } WHERE { ?worker a :Worker . ?switch a :Switch . ?switch :ON false }" .
+:day a owl:NamedIndividual, c:Window ; c:ofIndividual :u ; c:availableUntil "PT12S"^^xsd:dayTimeDuration .
+:night a owl:NamedIndividual, c:Window ; c:ofIndividual :v ; c:availableFrom "PT20S"^^xsd:dayTimeDuration .
+"""
+
+
+def test_other_actors_are_sought_if_the_steps_of_a_new_plan_have_no_schedule(tmp_path: Path) -> None:
+    execution = load(tmp_path, LIGHT, DONE).execute(interventions=["at=3 goal b2 ON true"])
+    assert execution.reached
+    lit = [(*event.step.arguments, event.begin) for event in execution.episode.events]
+    assert lit == [("u", "b", 0), ("v", "b2", 20)]
+    assert any(change.because == "the steps had no schedule" for change in execution.episode.replans)
+
+
 def test_an_episode_begins_no_step_after_it_has_given_up(tmp_path: Path) -> None:
     """The step for the third goal is executed; the event is over when a person has undone what it changed."""
     last = node(
