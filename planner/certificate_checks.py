@@ -52,6 +52,14 @@ def refusal(problem: Problem, certificate: Certificate, most: float = WORK) -> s
 
     If overlapping steps may reach more goals, the behaviours are the begins and the ends of steps. A plan may leave soft goals.
     """
+    try:
+        return rejection(problem, certificate, most)
+    except WorkLimitError as error:
+        return f"checking it takes {error}"
+
+
+def rejection(problem: Problem, certificate: Certificate, most: float = WORK) -> str | None:
+    """Return the same reason as `refusal`; raise `WorkLimitError` if the limit of work or time ends the check."""
     events = by_events(problem)
     if events is None:
         return "steps that overlap may reach more goals, and their begins and ends can't be examined separately"
@@ -72,8 +80,6 @@ def refusal(problem: Problem, certificate: Certificate, most: float = WORK) -> s
                 return f"{symbol} isn't a derived amount with bounds"
         cases = Cases(Lowest(problem, most), certificate)
         cases.explore()
-    except WorkLimitError as error:
-        return f"checking it takes {error}"
     except (ValueError, ZeroDivisionError) as error:
         return f"it isn't well formed: {error}"
     if cases.fault:

@@ -21,7 +21,7 @@ from confab.planner.possibilities import (
     calculated,
     compared,
 )
-from confab.reasoner.amounts import MORE, bounds, terms_of, towards, written
+from confab.reasoner.amounts import MORE, bounds, number, terms_of, towards, written
 from confab.reasoner.derivation import conditions_of_goal
 from confab.reasoner.language import substituted, terms, walk
 from confab.reasoner.problem import Problem
@@ -308,18 +308,21 @@ class _Causes:
                     for term, word in zip(terms, words, strict=True)
                     if word in free and term in own and not members(behavior.kinds[term]) <= members(free[word])
                 ]
-                found.append(self.lacking(claim, behavior, (*behavior.preconditions, *effect.when, *classes), bound))
+                asked = (*behavior.preconditions, *effect.when)
+                named = bound.keys() | set[str]().union(*map(variables, asked))
+                classes += [ClassCondition(p.name, p.kind) for p in behavior.parameters if p.name not in named]
+                found.append(self.lacking(claim, behavior, (*asked, *classes), bound))
+        inapplicable = bool(found)
         found = [cause for cause in found if cause.text]
         if amount and not found and self.kept(claim):
             return [Cause(f"no behaviour of level {lowest.level} {_leaving(fact)}")]
         if amount and not found:
             return [Cause(f"no behaviour of level {lowest.level} gives {self.direction(fact)}")]
+        if not found and kept:
+            return [Cause(f"no behaviour of level {lowest.level} gives {_named(symbol)} another value")]
         if not found:
-            what = (
-                f"gives {_named(symbol)} another value"
-                if kept
-                else f"has {'this effect' if first else f'the effect {claim}'}"
-            )
+            has = "this effect" if first else f"the effect {claim}"
+            what = f"with {has} is ever applicable" if inapplicable else f"has {has}"
             return [Cause(f"no behaviour of level {lowest.level} {what}")]
         return sorted(found, key=lambda cause: (bool(cause.rests_on), cause.parts, len(cause.rests_on)))
 
@@ -454,15 +457,18 @@ class _Causes:
         """Return the amount that a behaviour would move beyond its bounds."""
         reading, _ = self.reading()
         for env in reading.solutions(tuple(conditions), given, behavior.kinds):
+            if reading.amounts(behavior, env) is not None:
+                continue
             for effect in behavior.amounts:
-                for text, words in self.beyond(reading, env, effect):
-                    return Cause(f"{behavior.name} would {text}", (behavior.name, *words))
+                ways = reading.solutions(effect.when, env, behavior.kinds, must=True) if effect.when else [env]
+                for text, words in (found for way in ways for found in self.beyond(reading, way, effect)):
+                    return Cause(f"{behavior.name} {text}", (behavior.name, *words))
         return Cause("")
 
     def beyond(
-        self, reading: FactEvaluation, env: dict[str, str], effect: AmountEffect
+        self, reading: FactEvaluation, env: Mapping[str, str], effect: AmountEffect
     ) -> Iterator[tuple[str, tuple[str, ...]]]:
-        """Yield as text how an effect would violate the bounds of an amount."""
+        """Yield as text how an effect would violate the bounds of an amount; the text continues the name of a behaviour."""
         symbol = Symbol(effect.situation, tuple(env.get(a, a) for a in effect.arguments))
         quantity = self.lowest.quantity(effect.situation)
         old = reading.between(effect.situation, symbol.arguments)
@@ -472,16 +478,26 @@ class _Causes:
         words, terms = _named(symbol), (*symbol.arguments, symbol.situation)
         new = by if by is None or effect.operation == "assign" else calculated(OPERATORS[effect.operation], old, by)
         constraint = self.problem.domain.constraints.get(symbol.situation)
-        if constraint is not None:
-            yield f"violate the constraint that {constraint}", (constraint.situation,)
-        elif new is None:
-            yield f"make {words} an amount that can't be calculated", terms
+        if by is None or new is None:
+            yield f"would make {words} an amount that can't be calculated", terms
+        elif constraint is not None:
+            if quantity.most is not None and new.low > quantity.most:
+                yield f"would violate the constraint that {constraint}", (constraint.situation,)
         elif quantity.most is not None and new.low > quantity.most and isinstance(new.low, Fraction):
-            yield f"take {words} to {written(new.low)}, more than its maximum, {written(quantity.most)}", terms
+            yield f"would take {words} to {written(new.low)}, more than its maximum, {written(quantity.most)}", terms
         elif quantity.least is not None and new.high < quantity.least and isinstance(new.high, Fraction):
-            yield f"take {words} to {written(new.high)}, less than its minimum, {written(quantity.least)}", terms
+            needed, unit = quantity.least + Fraction(by.low), " " * bool(quantity.unit) + quantity.unit
+            if effect.operation == "decrease":
+                there = "are there" if old.high == number(self.lowest.initial(symbol)) else "can be there at most"
+                has = f"{written(Fraction(old.high))}{unit} {there}, and nothing gives more"
+                yield f"requires {written(needed)}{unit} of {words}; {has}", terms
+            else:
+                yield (
+                    f"would take {words} to {written(new.high)}, less than its minimum, {written(quantity.least)}",
+                    terms,
+                )
         elif quantity.whole and new.low == new.high and isinstance(new.low, Fraction) and new.low.denominator != 1:
-            yield f"take {words} to {written(new.low)}, which is no whole number", terms
+            yield f"would take {words} to {written(new.low)}, which is no whole number", terms
 
     def words(self, core: Sequence[Condition], given: dict[str, str], kinds: dict[str, str]) -> str:
         """Return failing conditions as text, phrased as a requirement: ``a Hand that canReach location9, and there is none``."""
@@ -492,6 +508,8 @@ class _Causes:
         if len(core) == 1:
             condition = substituted(core[0], given)
             if isinstance(condition, ClassCondition) and not condition.negated:
+                if condition.term.startswith("?"):
+                    return f"{an(condition.kind)}, and there is none"
                 return f"that {term(condition.term)} is {an(condition.kind)}, but {term(condition.term)} isn't"
             if isinstance(condition, RelationCondition) and not condition.negated and len(condition.arguments) == 2:
                 left, right = condition.arguments

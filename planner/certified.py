@@ -25,9 +25,10 @@ def certified(problem: Problem, outcome: Outcome) -> Outcome:
     """Return an outcome that is "unsolvable" only with a certificate, given or found, that the checker accepts, else "gave up"."""
     if outcome.status is not Status.UNSOLVABLE:
         return outcome
-    from confab.planner.certificate_checks import refusal
+    from confab.planner.certificate_checks import rejection
     from confab.planner.certificate_reasons import told
     from confab.planner.certifying import certify
+    from confab.planner.possibilities import NoTimeLeftError, WorkLimitError
 
     why = ""
     examined = outcome.reason is not None and outcome.reason.states > 0
@@ -39,10 +40,17 @@ def certified(problem: Problem, outcome: Outcome) -> Outcome:
         certificate = outcome.certificate if given else certify(events, few_states=examined)
         if certificate is None:
             continue
-        if (refused := refusal(problem, certificate)) is None:
-            reason = _added_up(events, certificate) or told(events, certificate)
-            return replace(outcome, certificate=certificate, reason=reason)
-        why = f"the checker refuses the certificate: {refused}"
+        try:
+            refused = rejection(problem, certificate)
+        except NoTimeLeftError:
+            why = "too little time was left to check the certificate; raise the time limit (--time-limit, in Python time_limit)"
+        except WorkLimitError as error:
+            why = f"the certificate wasn't checked, since the check takes {error}"
+        else:
+            if refused is None:
+                reason = _added_up(events, certificate) or told(events, certificate)
+                return replace(outcome, certificate=certificate, reason=reason)
+            why = f"the checker refuses the certificate: {refused}"
     searched = outcome.reason.text if outcome.reason else "the search found no plan"
     why = why or f"no certificate was found within the {'time' if current().left == 0 else 'work'} limit"
     reason = Reason(f"{searched}; this isn't certified: {why}", outcome.reason.terms if outcome.reason else ())

@@ -71,7 +71,7 @@ GETS, LEAVES, RANGE, ENDS = "gets", "leaves", "range", "ends"
 def certify(problem: Problem, most: float = WORK, few_states: bool = False) -> Certificate | None:
     """Return a certificate that a task has no plan, or None if there is a plan, or if the work limit is too small.
 
-    With `few_states`, a search has already examined all states, so a certificate of all states is tried first.
+    With `few_states`, a search has already examined all states, so that a certificate of all states is cheap.
     """
     if not problem.domain.levels:
         return None
@@ -80,7 +80,8 @@ def certify(problem: Problem, most: float = WORK, few_states: bool = False) -> C
     try:
         relaxed = Relaxed(lowest)
         if few_states:
-            found = _with_little(lowest, most, partial(by_states, lowest))
+            found = _with_little(lowest, PAIR, partial(relaxed.certificate, problem.goal))
+            found = found or _with_little(lowest, most, partial(by_states, lowest))
             if found is not None:
                 return _with_fewer(lowest, found)
         return (

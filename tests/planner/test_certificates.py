@@ -27,6 +27,7 @@ from confab.reasoner.aggregates.compiling import compiled
 from confab.reasoner.amounts import Amount, Calculation, Expression, Quantity
 from confab.reasoner.effects import spread
 from confab.reasoner.generate import write_scene
+from confab.reasoner.limits import within
 from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     FALSE,
@@ -282,6 +283,16 @@ def test_an_unsolvable_answer_without_an_accepted_certificate_becomes_gave_up() 
     forged = Certificate(unmet=tuple(Fact(symbol, value) for symbol, value in problem.goal.items()))
     said = certified(problem, Outcome(Status.UNSOLVABLE, certificate=forged))
     assert said.status is Status.GAVE_UP and said.reason is not None and "refuses" in said.reason.text
+
+
+def test_a_certificate_that_is_not_checked_in_time_is_not_called_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("confab.planner.possibilities.LOOKS", 1)
+    problem, certificate = next(unsolvable(range(15)))
+    with within(0.0):
+        said = certified(problem, Outcome(Status.UNSOLVABLE, certificate=certificate))
+    assert said.status is Status.GAVE_UP and said.reason is not None
+    assert "refuses" not in said.reason.text
+    assert "too little time was left to check the certificate; raise the time limit (--time-limit" in said.reason.text
 
 
 def test_every_mode_answers_unsolvable_with_a_certificate() -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from fractions import Fraction
 from itertools import pairwise
 
 import pytest
@@ -21,6 +22,7 @@ from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import (
     FALSE,
     TRUE,
+    AmountEffect,
     AnyOf,
     Behavior,
     ClassCondition,
@@ -219,6 +221,38 @@ def test_an_amount_that_nothing_changes_stays_as_it_is() -> None:
         initial = {**problem.initial, **dict.fromkeys(wanted, "1")}
         said = why(replace(problem, domain=domain, initial=initial, goal=wanted))
         assert said == "cup1 FILL 3 can't be reached: no behaviour of level 1 gives more"
+
+
+def brewery(malt: int, goal: str, brewers: tuple[str, ...] = ("ada",)) -> Problem:
+    """A brewer brews a batch from 150 kg of the malt in the silo; then the batch can be packed."""
+    brew = behavior(
+        "BREW", 1, "?w:Brewer ?b:Batch ?s:Silo", [has("AT", "?b", "planned")], [becomes("AT", "?b", "tank")]
+    )
+    brew = replace(brew, amounts=(AmountEffect("MALT", ("?s",), "decrease", Fraction(150)),))
+    pack = behavior("PACK", 1, "?b:Batch", [has("AT", "?b", "tank")], [becomes("AT", "?b", "store")])
+    malt_type = SituationType("MALT", ("Silo",), "MALT", quantity=Quantity("kg", least=Fraction(0)))
+    classes = {"Brewer": brewers, "Batch": ("weiss",), "Silo": ("silo",), "Place": ("planned", "tank", "store")}
+    initial = {"AT weiss": "planned", "MALT silo": str(malt)}
+    return world(
+        [SituationType("AT", ("Batch",), "Place"), malt_type], [brew, pack], classes, initial, {"AT weiss": goal}
+    )
+
+
+def test_the_reason_states_the_amount_that_a_behaviour_lacks() -> None:
+    lacking = "BREW requires 150 kg of silo MALT; 100 kg are there, and nothing gives more"
+    assert why(brewery(150, "tank")) == ""
+    assert why(brewery(100, "tank")) == f"weiss AT tank can't be reached: {lacking}"
+    for few_states in (False, True):
+        certificate = certify(brewery(100, "store"), few_states=few_states)
+        assert certificate is not None
+        said = told(brewery(100, "store"), certificate).text
+        assert said == f"weiss AT store can't be reached: {lacking}; so weiss AT tank never holds"
+
+
+def test_the_reason_states_that_the_class_of_a_parameter_has_no_individuals() -> None:
+    assert why(brewery(150, "tank", brewers=())) == (
+        "weiss AT tank can't be reached: BREW requires a Brewer, and there is none"
+    )
 
 
 # ----------------------------------------------------------------------------------------- grounded, and why not
