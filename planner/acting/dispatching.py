@@ -11,6 +11,7 @@ from confab.planner.plan import Plan, Reason, Step, renumbered
 from confab.planner.timed.call import Timed, best_in_time, in_time
 from confab.planner.timed.dispatch import Dispatch
 from confab.planner.timed.plan import TimedPlan
+from confab.planner.validation import fitting
 from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import Symbol, Times
 
@@ -108,7 +109,16 @@ def remaining(
     for step in primitives:
         if step.behavior in every.events.keys() - times.events.keys():
             return Reason(f"{step}: it happens only once, at {float(every.events[step.behavior]):g} s")
-    flat = Plan(tuple(replace(step, path=(number,)) for number, step in enumerate(primitives)))
+    flat = Plan(
+        tuple(
+            replace(
+                step, path=(number,), id=problem.id_of(step.behavior, step.arguments)
+            )  # the ID in a file may be wrong
+            if fitting(problem, step)
+            else replace(step, path=(number,))
+            for number, step in enumerate(primitives)
+        )
+    )
     found, given_up = Timed(together.schedule), tuple[Symbol, ...]()
     if together.schedule is None or [*map(_kind, together.schedule.plan.primitives)] != [*map(_kind, primitives)]:
         asked = replace(problem, times=times)

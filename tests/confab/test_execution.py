@@ -13,7 +13,7 @@ from rich.console import Console
 import confab
 from confab import ontology
 from confab.cli import main
-from confab.execution import execute
+from confab.execution import carry_out, execute
 from confab.interchange import episode_json
 from confab.intervening import parse_interventions
 from confab.live import View, in_terminal
@@ -395,6 +395,17 @@ def test_a_task_with_durations_is_executed_in_time_and_keeps_its_constraints(
         assert run.summary().endswith(f"in {seconds:g} s")
     varied = [scene.execute(perturb=True, seed=seed).episode.seconds["simulated"] for seed in (1, 2, 2)]
     assert varied[0] != varied[1] == varied[2]
+
+
+def test_wrong_ids_in_a_plan_file_do_not_change_how_the_plan_is_executed(tmp_path: Path) -> None:
+    scene = confab.load(EXAMPLES / "bakery" / "bakery.ttl")
+    result = scene.plan()
+    (tmp_path / "plan.json").write_text(
+        json.dumps({"steps": [{**one, "id": 0} for one in result.json()["steps"]]}), "utf-8"
+    )
+    right, wrong = (carry_out(scene, plan) for plan in (result.plan, scene.read_plan(tmp_path / "plan.json")))
+    assert wrong.reached
+    assert wrong.episode.seconds["simulated"] == right.episode.seconds["simulated"]
 
 
 def test_the_bakery_of_the_guide_is_executed_within_its_window_and_its_deadline() -> None:
