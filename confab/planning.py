@@ -139,10 +139,11 @@ def plan_by(scene: Known, goals: list[str], options: PlanOptions, choosing: bool
         quantified = perf_counter() - begin
         check_goal(scene.iri, task.problem)
         found = plan_task(replace(task, choosing=choosing))
+        outcome = replace(found.outcome, seconds=perf_counter() - begin - quantified)
         seconds = {**scene.seconds, "quantify": quantified}
         queries = scene.knowledge.round_trips - asked
         return Result(
-            scene, found.problem, found.outcome, seconds, queries, found.part, tuple(goals), found.timed, found.optimal,
+            scene, found.problem, outcome, seconds, queries, found.part, tuple(goals), found.timed, found.optimal,
             replace(options, memory=memory),
         )  # fmt: skip
 
@@ -512,6 +513,8 @@ class Result(metaclass=RightNames):
         if self.optimal:
             return "a longer time limit (--time-limit, in Python time_limit) may prove more, or find a better plan"
         how = "--optimal or --time-limit (in Python optimal=True, time_limit=S) looks for a cheaper one"
+        if self.options.time_limit is not None:
+            how = "--optimal (in Python optimal=True) looks for a cheaper one"
         if circles := in_circles(self.problem, self.plan):
             of = len(self.plan.primitives)
             return f"{circles} of the {of} primitives only undo each other (the steps above ask for them); {how}"

@@ -168,7 +168,7 @@ def summary(outcome: Outcome) -> str:
     if outcome.hits or outcome.misses:
         effort += f", refinements {outcome.hits} from the cache and {outcome.misses} searched"
     if outcome.seconds:  # a plan from a file wasn't searched
-        effort += f", {outcome.seconds * 1000:.0f} ms of search"
+        effort += f", {outcome.seconds * 1000:.0f} ms of planning"
     by = f" by {outcome.engine}" if outcome.engine else ""
     lines = [f"solved{by}: {lengths(outcome.plan)} steps{on}{effort}{bound}"]
     lines += unmet

@@ -285,7 +285,9 @@ def export(
             problem = load_scene(scene).problem
             paths = export_pddl(problem, level, out)
             if has_times(problem):
-                remark("the PDDL has no durations, deadlines or windows of availability")
+                events = problem.times.events if problem.times else {}
+                some = "".join(f"; the external event {one} becomes an action without a time" for one in events)
+                remark(f"the PDDL has no durations, deadlines or windows of availability{some}")
     for path in paths:
         print(path)
 

@@ -244,7 +244,9 @@ class _RunningEpisode:
     def break_off(self, why: str) -> None:
         """End the episode at once, because the world doesn't respond."""
         self.going, self.record.status = False, End.GAVE_UP
-        self.record.reason(Reason(why))
+        limit, _, _ = why.partition(" while ")
+        if not any(limit in reason.text for reason in self.record.reasons):  # planning may have met the same limit
+            self.record.reason(Reason(why))
         self.say("over", text=f"{End.GAVE_UP.value}: {why}")
 
     def episode(self) -> Episode:

@@ -4,7 +4,9 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
+from time import sleep
 
 import pytest
 from click.testing import CliRunner
@@ -14,6 +16,7 @@ from confab import ontology
 from confab.cli import app
 from confab.history import compared, new_folder, record, runs
 from confab.page.data import page_data
+from confab.plan_call import Found, PlanningTask, plan_task
 from confab.sim.rollouts import Trial
 from confab.sim.verify import Rollout
 
@@ -161,6 +164,27 @@ def test_a_plan_whose_steps_undo_each_other_is_reported_with_the_option_for_a_sh
     assert said.startswith("12 of the 30 primitives only undo each other")
     assert "--optimal" in said
     assert confab.load("beverage-serving").plan().dearer() == ""
+
+
+def test_a_remark_on_cheaper_plans_names_only_options_that_were_not_given() -> None:
+    result = confab.load("three-cups").plan(leave_levels=False)
+    assert "--optimal or --time-limit" in result.dearer()
+    said = replace(result, options=replace(result.options, time_limit=5.0)).dearer()
+    assert "--optimal" in said and "time" not in said
+
+
+def test_the_printed_time_of_planning_includes_certificates_and_schedules(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = confab.load("beverage-serving")
+
+    def slow(task: PlanningTask) -> Found:
+        found = plan_task(task)
+        sleep(0.2)
+        return found
+
+    monkeypatch.setattr("confab.planning.plan_task", slow)
+    result = scene.plan()
+    assert result.outcome.seconds >= 0.2
+    assert f"{result.outcome.seconds * 1000:.0f} ms of planning" in repr(result)
 
 
 def test_a_closed_output_pipe_has_another_exit_code_than_a_negative_answer() -> None:

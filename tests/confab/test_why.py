@@ -10,12 +10,14 @@ import confab
 import ontology
 from confab import Scene
 from confab.cli import app, main
-from confab.labels import labels_of
+from confab.labels import Labels, labels_of
 from confab.lifted import Sayings
 from confab.planner.plan import Plan
 from confab.planner.plan_costs import cost_of
 from confab.planner.validation import validate
 from confab.reasoner.memory.experience import ITSELF
+from confab.reasoner.problem import Domain
+from worlds.writing import behavior
 
 GUESTS = Path(__file__).parent / "cases" / "guests.ttl"
 
@@ -213,6 +215,22 @@ def test_the_explanation_of_an_unsolvable_task_names_the_contested_place() -> No
     told = confab.load("beverage-serving").explain(["cup1 LOCATION location7", "cup2 LOCATION location7"])
     assert told.steps == ()
     assert "location7" in told.headline
+
+
+@pytest.mark.parametrize(
+    ("label", "sentence"),
+    [
+        ("move a cup to the TUB", "move cup 2 to tub"),
+        ("move cup: a cup is heavy", "move cup 2: a cup is heavy (tub)"),
+        ("move cups", "move cups (cup 2, tub)"),
+    ],
+)
+def test_an_individual_replaces_the_first_word_of_a_label_that_equals_the_name_of_its_parameter(
+    label: str, sentence: str
+) -> None:
+    move = behavior("MOVE", 1, "?cup:Cup ?tub:Tub", [], [])
+    domain = Domain({}, {"MOVE": move})
+    assert Labels({"MOVE": label, "cup2": "cup 2"}, {}, domain).grounded("MOVE", ("cup2", "tub")) == sentence
 
 
 def test_the_proof_that_no_plan_exists_is_explained_in_the_labels_of_the_scene() -> None:

@@ -6,6 +6,7 @@ from fractions import Fraction
 from functools import partial
 from pathlib import Path
 from random import Random
+from time import sleep
 
 import pytest
 
@@ -14,10 +15,12 @@ from confab.planner.acting.dispatching import Concurrency, later
 from confab.planner.acting.episode import End, Episode, Event, Intervention, InterventionKind
 from confab.planner.acting.executive import act
 from confab.planner.acting.symbolic_world import SymbolicWorld
+from confab.planner.plan import Limits, Outcome, Reason, Status
 from confab.planner.solve import Request, solve
 from confab.planner.timed.call import best_in_time
 from confab.planner.timed.plan import Slot, TimedPlan
 from confab.planner.timed.validation import validate_timed
+from confab.reasoner.limits import current, within
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse
 from confab.reasoner.pddl.turtle import turtle
@@ -164,6 +167,19 @@ def test_a_goal_is_reached_when_its_step_ends_although_a_step_that_it_needs_mean
     episode = act(problem, SymbolicWorld(problem), timed.plan, together=Concurrency(timed))
     assert episode.status is End.REACHED
     assert [(change.seconds, change.value) for change in episode.course] == [(0, "true"), (5, "true"), (8, "false")]
+
+
+def test_a_time_limit_that_ends_planning_and_then_the_episode_is_one_reason() -> None:
+    said = "gave up after 0.8 s while compiling conditions; give more time"
+
+    def too_slow(problem: Problem, limits: Limits | None = None) -> Outcome:
+        sleep(0.01 + (current().left or 0.0))
+        return Outcome(Status.GAVE_UP, reason=Reason(said))
+
+    with within(0.8):
+        episode = act(serving(), SymbolicWorld(serving()), planner=too_slow)
+    assert episode.status is End.GAVE_UP
+    assert [reason.text for reason in episode.reasons] == [said]
 
 
 def test_steps_that_overlap_by_need_and_are_planned_anew_are_given_up_and_not_called_impossible() -> None:

@@ -62,6 +62,23 @@ def test_an_external_event_happens_although_no_goal_needs_it(seconds: int, statu
     assert (f"SHUT happens at {seconds} s" in str(outcome.reason)) is (status is Status.GAVE_UP)
 
 
+@pytest.mark.parametrize("stated", [False, True])
+def test_level_1_needs_a_behaviour_that_an_event_refines_if_its_steps_require_the_event(
+    stated: bool, tmp_path: Path
+) -> None:
+    event = node(
+        "OPEN", "Behavior", "", f" ; c:level 2 ; c:index 2 ; c:postcondition :opens{lasts(0)}{lasts(4, 'happensAt')}"
+    )
+    work = WORK.replace("level 1", "level 2") + node("OPENED", "ValueCondition", "b2")
+    work = work.replace("c:precondition :needs", "c:precondition :needs, :OPENED")
+    upper = node("BEGIN", "Behavior", "", f"{FIRST} ; c:precondition :OPENED ; c:postcondition :begins")
+    upper += node("begins", "ValueEffect", "b") + node("opens", "ValueEffect", "b2")
+    wait = node("WAIT", "Behavior", "", " ; c:level 1 ; c:index 2 ; c:postcondition :opens") if stated else ""
+    result = load(tmp_path, work, upper, event, wait, DONE).plan()
+    assert [step.behavior for step in result.plan.primitives] == ["OPEN", "WORK"]
+    assert [step.behavior for step in result.plan.steps] == (["WAIT", "BEGIN"] if stated else ["OPEN", "WORK"])
+
+
 def test_an_event_that_changes_nothing_is_a_step_of_the_plan_above_any_level(tmp_path: Path) -> None:
     event = node(
         "OPEN", "Behavior", "", f" ; c:level 2 ; c:index 2 ; c:postcondition :opens{lasts(0)}{lasts(4, 'happensAt')}"

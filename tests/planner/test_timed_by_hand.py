@@ -36,6 +36,7 @@ from confab.reasoner.symbols import (
     Symbol,
     Times,
     Timing,
+    Witness,
 )
 from tests.planner.test_overlapping_by_need import task
 from worlds.writing import becomes, behavior, has, world
@@ -318,3 +319,21 @@ if find_spec("ortools") is not None:  # it isn't among the packages of the suite
         assert begins is not None
         found, bound = shorter(order, network, choices, CandidateSchedule(order.turns, begins), 0, 60.0)
         assert (begins.makespan, found.makespan, bound) == (60, 40, 40)
+
+
+@pytest.mark.parametrize(("tank", "conflicts"), [("tank1", True), ("tank2", False)])
+def test_a_quantifier_over_the_objects_with_a_value_conflicts_only_with_pending_effects_on_this_value(
+    tank: str, conflicts: bool
+) -> None:
+    empty = Witness("?any", "Batch", (has("AT", "?any", "?t"),), negated=True)
+    inspect = lasting(behavior("INSPECT", 1, "?t:Tank", [empty], [becomes("SEEN", "?t", TRUE)]), 10)
+    fill = lasting(behavior("FILL", 1, "?b:Batch ?t:Tank", [has("AT", "?b", "out")], [becomes("AT", "?b", "?t")]), 10)
+    classes = {"Batch": ("ale",), "Tank": ("tank1", "tank2"), "Place": ("out", "tank1", "tank2")}
+    at = SituationType("AT", ("Batch",), "Place")
+    problem = world([at, truth("SEEN", "Tank")], [inspect, fill], classes, {"AT ale": "out"}, {"SEEN tank1": TRUE})
+    plan = steps(problem, ("INSPECT", "tank1"), ("FILL", "ale", tank))
+    inspecting, filling = plan.steps
+    slots = (Slot(inspecting, Fraction(5), Fraction(15)), Slot(filling, Fraction(0), Fraction(10)))
+    said = [fault.text for fault in validate_timed(problem, TimedPlan(plan, slots))]
+    assert bool(said) is conflicts
+    assert not said or "is changing AT of ale" in said[0]

@@ -20,9 +20,13 @@ from confab.planner.timed.plan import TimedPlan
 from confab.planner.timed.sharing import crews_of
 from confab.planning import Result
 from confab.reasoner.limits import OutOfTimeError
+from confab.reasoner.pddl.importing import imported
+from confab.reasoner.pddl.syntax import parse
+from confab.reasoner.pddl.turtle import turtle
 from confab.reasoner.problem import Problem
-from confab.reasoner.symbols import Symbol
+from confab.reasoner.symbols import Symbol, Times
 from confab.timing import Minimise
+from tests.reasoner.test_durative import TRUCK, WAY
 from worlds.families import family
 
 ROBOTS = '''
@@ -370,6 +374,16 @@ def test_an_export_says_that_pddl_has_no_times(tmp_path: Path) -> None:
     assert "the PDDL has no durations, deadlines or windows of availability" in done.stderr
     done = CliRunner().invoke(app, ["export", "house-small", "-o", str(tmp_path / "house")])
     assert done.stderr == ""
+
+
+def test_an_export_names_the_external_events_that_become_actions(tmp_path: Path) -> None:
+    problem = imported(parse(TRUCK, WAY)).problem
+    (tmp_path / "way.ttl").write_text(turtle(problem, "title", "description"), "utf-8")
+    events = list((confab.load(tmp_path / "way.ttl").problem.times or Times()).events)
+    done = CliRunner().invoke(app, ["export", str(tmp_path / "way.ttl"), "-o", str(tmp_path / "pddl")])
+    assert events
+    for event in events:
+        assert f"the external event {event} becomes an action without a time" in done.stderr
 
 
 CUPS = """
