@@ -99,6 +99,7 @@ def best_in_time(
     if shorten:
         with suppress(LimitError), within(left(0.25)):
             bound = of_any_plan(problem)
+    if shorten or found.plan is None:
         found = _spread(problem, plan, found, left(0.33), separation)
     if not enough(found):
         end = None if until is None else until - KEPT * (until - perf_counter())
@@ -106,7 +107,8 @@ def best_in_time(
         if other is not None:
             with suppress(LimitError):
                 found = _better(problem, found, in_time(problem, other, left(0.5 if shorten else 1.0), separation))
-            found = _spread(problem, other, found, left(1.0), separation) if shorten else found
+            if shorten or found.plan is None:
+                found = _spread(problem, other, found, left(1.0), separation)
     if found.plan is None or not shorten:
         return found
     return replace(found, plan=replace(found.plan, least=bound, bound=max(found.plan.bound, bound)))

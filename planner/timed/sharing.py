@@ -6,9 +6,10 @@ steps. A task is a goal, or a step to be executed early, with a crew. A stretch 
 state. The default planner finds the steps of a stretch. All goals that were achieved before still hold after a stretch.
 
 The first sequence of tasks follows the plan, or assigns each goal greedily to the crew that achieves the goal first. Then the
-search makes one change at a time, preferably to a task on the critical path. A change concerns the crew or the position of a task.
-The first sequence and the best sequence are also improved by takeovers (`confab.planner.timed.takeovers`): an actor takes over
-single parts of the steps of another actor, whichever goal the steps serve. If the makespan is minimised with a time limit, the
+search makes one change at a time, preferably to a task on the critical path. A change concerns the crew or the position of a
+task. The first sequence and the best sequence are also improved by takeovers (`confab.planner.timed.takeovers`): an actor takes
+over single parts of the steps of another actor, whichever goal the steps serve. Takeovers need no planning, so a late sequence
+of the plan is improved by takeovers before the greedy sequence is built. If the makespan is minimised with a time limit, the
 search goes on from the best sequence after a few changes, whatever they cost. The search ends if the schedule reaches a lower
 bound, if all actors are busy for the whole makespan, or after many changes without a better schedule. Without a time limit, the
 work is bounded, too, so that the result is the same on every machine.
@@ -295,10 +296,16 @@ class _SharingSearch:
 
     def run(self) -> None:
         """Build the sequence of the plan and the greedy sequence, and improve the better sequence by changes."""
-        self.best, until = self.own(), self.until
-        starts = [] if self.best is None else [self.best]
-        if until is not None and self.best is not None and not self.best.cost[0]:
+        own, until = self.own(), self.until
+        self.best, starts, late = own, [] if own is None else [own], own is not None and own.cost[0] > 0
+        if until is not None and own is not None:
             self.until = (perf_counter() + until) / 2
+        if own is not None and late:
+            self.limit(MOST_WORK // 4)
+            with suppress(LimitError):
+                self.eased(own)
+        if self.best is not None and self.best.cost[0]:
+            self.until = until
         self.limit(MOST_WORK // 2)
         for start in starts if not any(step.joined for step in self.plan.steps) else ():
             self.remember(start)  # no single goal needs all steps of a joint refinement
@@ -309,11 +316,11 @@ class _SharingSearch:
         self.limit(inf if self.shorten and self.until is not None else MOST_WORK)
         if not starts:
             return
-        self.best, random, barren = min(starts, key=lambda one: one.cost), Random(0), 0
-        now = self.best
+        now, random, barren = min(starts, key=lambda one: one.cost), Random(0), 0
+        self.best = min(now, self.best or now, key=lambda one: one.cost)
         for start in sorted(starts, key=lambda one: one.cost):
             self.remember(start)
-            if start is now or self.best.cost[0]:
+            if (start is now or self.best.cost[0]) and not (late and start is own):
                 self.eased(start)
         self.improve(now, random)
         self.eased(self.best)
@@ -431,7 +438,7 @@ class _SharingSearch:
             tasks = [] if now is None else now.tasks
             found: list[_Sequence] = []
             for goal in waiting:
-                found = [one for crew in self.crews if (one := self.built([*tasks, (goal, crew)], now)) is not None]
+                found = self.by_each_crew(tasks, goal, now)
                 if found:
                     waiting.remove(goal)
                     break
@@ -439,6 +446,18 @@ class _SharingSearch:
                 return None
             now = min(found, key=lambda one: (one.cost[0], one.end, *one.cost[1:]))
         return now
+
+    def by_each_crew(self, tasks: Sequence[SharedTask], goal: Symbol, like: _Sequence | None) -> list[_Sequence]:
+        """Return sequences of tasks with a further goal for each crew that achieves it; at a limit, those found before it."""
+        found = list[_Sequence]()
+        try:
+            for crew in self.crews:
+                if (one := self.built([*tasks, (goal, crew)], like)) is not None:
+                    found.append(one)
+        except LimitError:
+            if not found:
+                raise
+        return found
 
     def changed(self, now: _Sequence, random: Random) -> list[SharedTask]:
         """Return the tasks of a sequence after one random change.

@@ -130,6 +130,20 @@ def test_a_dearer_place_is_used_only_if_this_shortens_the_makespan(
     assert [float(result.timed.makespan), result.cost] == [makespan, cost]
 
 
+def test_objects_use_several_places_if_one_place_after_the_other_is_too_late(tmp_path: Path) -> None:
+    own = "".join(f":{arm} a :Arm, owl:NamedIndividual .\n" for arm in ("arm1", "arm2"))
+    different = "[] a owl:AllDifferent ; owl:distinctMembers ( :table :basin1 :basin2 :cup1 :cup2 :arm1 :arm2 ) .\n"
+    task = ":task a owl:NamedIndividual, c:Task ; c:goal :goal1, :goal2 .\n" + "".join(
+        f""":goal{cup} a owl:NamedIndividual, c:ValueCondition ; c:about :cup{cup} ; c:situationType :CLEAN ;
+        c:by "PT4S"^^xsd:dayTimeDuration .\n"""
+        for cup in (1, 2)
+    )
+    (tmp_path / "basins.ttl").write_text(BASINS + own + different + task)
+    result = confab.load(tmp_path / "basins.ttl").plan()
+    assert result.timed is not None
+    assert [float(result.timed.makespan), result.cost] == [4, 103]
+
+
 def test_every_step_spans_its_refinement() -> None:
     intervals = served().intervals
     for step in served().plan.walk():

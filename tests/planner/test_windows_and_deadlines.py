@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import pytest
@@ -14,6 +15,7 @@ import confab
 import confab.plan_call
 import confab.timing
 from confab.cli import app
+from confab.planner.hierarchical.call import Compiled, compiled
 from confab.planner.plan import Limits, Outcome, Plan, Status
 from confab.planner.solve import Mode, Request, solve
 from confab.planner.timed.plan import TimedPlan
@@ -138,6 +140,35 @@ def test_a_robot_whose_window_ends_leaves_the_rest_to_another(tmp_path: Path) ->
 def test_a_robot_that_is_available_too_late_leaves_the_goal_to_another(tmp_path: Path) -> None:
     result = planned(tmp_path, {"r1": "hall", "r2": "hall"}, {"a": 13, "b": None}, [("r1", 20, None)])
     assert result.solved
+
+
+def test_another_robot_takes_over_late_steps_even_if_there_is_no_time_to_plan_the_goals_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bell = """
+:BELL a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 9 ; c:duration "PT0S"^^xsd:dayTimeDuration ;
+  c:happensAt "PT3S"^^xsd:dayTimeDuration ; c:update "INSERT { :bell :CLEAN true } WHERE {}" .
+"""
+    robots, windows = {"r1": "hall", "r2": "hall"}, [("r1", 0, 15), ("r2", 30, None)]
+    planned(tmp_path, robots, {"a": None, "b": None, "bell": None}, windows, more=bell)
+    passed = [0.0]
+
+    def slowly(problem: Problem) -> Compiled:
+        passed[0] += 60.0
+        return compiled(problem)
+
+    monkeypatch.setattr("confab.planner.timed.sharing.perf_counter", lambda: perf_counter() + passed[0])
+    monkeypatch.setattr("confab.planner.timed.sharing.compiled", slowly)
+    timed = confab.load(tmp_path / "robots.ttl").plan(time_limit=30.0).timed
+    assert timed is not None
+    assert "r2" in {actor for actor, _ in timed.lanes()}
+
+
+def test_a_schedule_that_was_found_before_a_limit_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in {"MOST_WORK": 30_000, "MOST_TAKEOVERS": 0, "MOST_BARREN": 0, "BARREN_ROUNDS": 0}.items():
+        monkeypatch.setattr(f"confab.planner.timed.sharing.{name}", value)
+    robots = {f"r{number}": "hall" for number in range(1, 9)}
+    assert planned(tmp_path, robots, {"a": None}, [("r1", 0, 9)]).solved
 
 
 def test_two_robots_in_different_rooms_meet_deadlines_that_one_alone_misses(tmp_path: Path) -> None:
