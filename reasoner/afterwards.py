@@ -79,16 +79,15 @@ def opposite(formula: Condition) -> Condition:
 
 
 def negation(formula: Simplified | Conjunction) -> Simplified:
-    """Return the negation of a formula or conjunction."""
+    """Return the negation of a formula or conjunction; variables that it determines are local to the negation."""
     if formula is None or isinstance(formula, bool):
         return not formula
-    if not isinstance(formula, tuple):
-        return opposite(formula)
-    if not formula:
+    group = formula if isinstance(formula, tuple) else (formula,)
+    if not group:
         return False
-    if len(formula) == 1 and not _binding(formula[0]):
-        return opposite(formula[0])
-    return AnyOf((formula,), negated=True)
+    if len(group) == 1 and not _binding(group[0]):
+        return opposite(group[0])
+    return AnyOf((group,), negated=True)
 
 
 def _binding(condition: Condition) -> bool:
@@ -224,7 +223,7 @@ class Afterwards:
         """Return a condition on the state before the behaviour, simplified by means of the preconditions."""
         if isinstance(condition, ValueCondition):
             found = self.value(condition.situation, condition.arguments, condition.value)
-            return negation(found) if condition.negated else found
+            return self._negated(found, condition) if condition.negated else found
         return condition
 
     def value(self, situation: str, arguments: tuple[str, ...], value: str) -> Simplified:
@@ -284,7 +283,13 @@ class Afterwards:
                 found = either(both(map(self.condition, group)) for group in alternatives)
             case _:
                 return condition
-        return negation(found) if negated else found
+        return self._negated(found, condition) if negated else found
+
+    def _negated(self, found: Simplified, condition: Condition) -> Simplified:
+        """Return the negation of the translation of a condition; other conditions bind the variables of a condition on a value."""
+        if isinstance(condition, ValueCondition) and found == replace(condition, negated=False):
+            return condition
+        return negation(found)
 
     def _overwritten(
         self, effect: ValueEffect, arguments: tuple[str, ...], value: str, before: Simplified

@@ -297,7 +297,8 @@ class _Scene:
 
     def numbers(self, text: str) -> set[str]:
         """Return the variables of an update that stand for numbers; two updates that are joined share variables of one name."""
-        stems = ["after", *(name.lower() for name, its in self.situations.items() if its.quantity is not None)]
+        amounts = [name for name, its in self.situations.items() if its.quantity is not None]
+        stems = ["after", *amounts, *map(str.lower, amounts)]
         return set(re.findall(rf"\?(?:{'|'.join(stems)})\w*", text))
 
     def as_update(self, one: Behavior) -> str | None:

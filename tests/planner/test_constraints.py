@@ -179,3 +179,33 @@ def test_a_bounded_count_that_a_step_raises_and_lowers_again_is_kept_on_two_leve
     timed = confab.load(Path(__file__).parent / "cases" / "ovens-in-levels.ttl").plan(minimise="makespan").timed
     assert timed is not None
     assert timed.makespan == 120
+
+
+REFILL = """@prefix : <https://example.org/tanks#> .
+@prefix c: <https://w3id.org/confab/core#> .
+@prefix owl: <http://www.w3.org/2002/07/owl#> .
+@prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .
+<https://example.org/tanks> a owl:Ontology ; owl:imports <https://w3id.org/confab/core> ; c:symbolicOnly true .
+:Tank a owl:Class ; rdfs:subClassOf c:Object ; c:hasSituationType :SEALED, :CHECKED, :HOLDS .
+:SEALED a owl:Class, owl:NamedIndividual, c:SituationType ; c:always true .
+:CHECKED a owl:Class, owl:NamedIndividual, c:SituationType .
+:HOLDS a owl:Class, owl:NamedIndividual, c:SituationType ; c:valueProperty :holds .
+:holds a owl:ObjectProperty, owl:FunctionalProperty ; rdfs:domain :Tank ; rdfs:range :HOLDS .
+:oil a owl:NamedIndividual, :HOLDS . :water a owl:NamedIndividual, :HOLDS .
+:tank a owl:NamedIndividual, :Tank ; c:index 1 ; :holds :oil .
+:sealed a owl:NamedIndividual, c:SituatedObjectInstance ; c:about :tank ; c:situationType :SEALED .
+[ a owl:AllDifferent ; owl:distinctMembers ( :oil :water :tank ) ] .
+:CHECK a owl:NamedIndividual, c:Behavior ; c:level 1 ; c:index 1 ; c:update '''
+  DELETE { ?tank :SEALED true } INSERT { ?tank :CHECKED true } WHERE { ?tank a :Tank } ;
+  INSERT { ?tank :SEALED true } WHERE { ?tank :holds ?liquid }''' .
+:task a owl:NamedIndividual, c:Task ; c:goal [ a c:ValueCondition ; c:about :tank ; c:situationType :CHECKED ] .
+"""
+
+
+def test_an_effect_whose_condition_holds_for_one_of_several_values_keeps_a_constraint(tmp_path: Path) -> None:
+    """The tank is open only during the step: it holds some liquid, whichever it is."""
+    (tmp_path / "tanks.ttl").write_text(REFILL, "utf-8")
+    outcome = confab.load(tmp_path / "tanks.ttl").plan().outcome
+    assert outcome.status is Status.SOLVED
+    (tmp_path / "tanks.ttl").write_text(REFILL.replace("?liquid", ":water"), "utf-8")
+    assert confab.load(tmp_path / "tanks.ttl").plan().outcome.status is Status.UNSOLVABLE
