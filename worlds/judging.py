@@ -290,6 +290,7 @@ class Judge:
         if refused:
             return
         if not self.only or self.only == "checker":
+            self.call("reading", lambda: read.reading, PROVING)  # planning may have ended while it read the scene
             self.call("checker", lambda: self.states(read.reading.problem))
             plans = [outcome.plan for outcome in results.values() if outcome is not None and outcome.plan is not None]
             self.call("checker", lambda: self.checker(read.reading.problem, plans))

@@ -109,16 +109,7 @@ def remaining(
     for step in primitives:
         if step.behavior in every.events.keys() - times.events.keys():
             return Reason(f"{step}: it happens only once, at {float(every.events[step.behavior]):g} s")
-    flat = Plan(
-        tuple(
-            replace(
-                step, path=(number,), id=problem.id_of(step.behavior, step.arguments)
-            )  # the ID in a file may be wrong
-            if fitting(problem, step)
-            else replace(step, path=(number,))
-            for number, step in enumerate(primitives)
-        )
-    )
+    flat = Plan(renumbered(_with_right_id(problem, step) for step in primitives))
     found, given_up = Timed(together.schedule), tuple[Symbol, ...]()
     if together.schedule is None or [*map(_kind, together.schedule.plan.primitives)] != [*map(_kind, primitives)]:
         asked = replace(problem, times=times)
@@ -136,6 +127,11 @@ def remaining(
     kept = replace(times, deadlines={goal: by for goal, by in times.deadlines.items() if goal not in given_up})
     dispatch = Dispatch(replace(problem, times=kept), found.plan, together.spread, same_actors=True)
     return Remaining(dispatch, _paths(scheduled, Plan(steps).primitives), steps, given_up)
+
+
+def _with_right_id(problem: Problem, step: Step) -> Step:
+    """Return a primitive with its ID in the problem; the ID in a plan file may be wrong."""
+    return replace(step, id=problem.id_of(step.behavior, step.arguments)) if fitting(problem, step) else step
 
 
 def _with_events(steps: tuple[Step, ...], scheduled: Sequence[Step], free: int) -> tuple[Step, ...]:

@@ -244,9 +244,7 @@ class _RunningEpisode:
     def break_off(self, why: str) -> None:
         """End the episode at once, because the world doesn't respond."""
         self.going, self.record.status = False, End.GAVE_UP
-        limit, _, _ = why.partition(" while ")
-        if not any(limit in reason.text for reason in self.record.reasons):  # planning may have met the same limit
-            self.record.reason(Reason(why))
+        self.record.reason(Reason(why))
         self.say("over", text=f"{End.GAVE_UP.value}: {why}")
 
     def episode(self) -> Episode:
@@ -662,6 +660,7 @@ class _RunningEpisode:
 
         A goal that needs facts in doubt is postponed until all other goals are handled.
         """
+        check("planning")  # no plan is missing if the time of the episode is over
         belief = self.belief
         reason = outcome.reason if outcome is not None and outcome.reason else Reason("no plan was found")
         unsolvable, end = outcome is not None and outcome.status is Status.UNSOLVABLE, limits.end()

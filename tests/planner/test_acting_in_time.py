@@ -170,16 +170,14 @@ def test_a_goal_is_reached_when_its_step_ends_although_a_step_that_it_needs_mean
 
 
 def test_a_time_limit_that_ends_planning_and_then_the_episode_is_one_reason() -> None:
-    said = "gave up after 0.8 s while compiling conditions; give more time"
-
     def too_slow(problem: Problem, limits: Limits | None = None) -> Outcome:
         sleep(0.01 + (current().left or 0.0))
-        return Outcome(Status.GAVE_UP, reason=Reason(said))
+        return Outcome(Status.GAVE_UP, reason=Reason("gave up after 0.8 s while compiling conditions; give more time"))
 
     with within(0.8):
         episode = act(serving(), SymbolicWorld(serving()), planner=too_slow)
     assert episode.status is End.GAVE_UP
-    assert [reason.text for reason in episode.reasons] == [said]
+    assert [reason.text for reason in episode.reasons] == ["gave up after 0.8 s while planning; give more time"]
 
 
 def test_steps_that_overlap_by_need_and_are_planned_anew_are_given_up_and_not_called_impossible() -> None:
