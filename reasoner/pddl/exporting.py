@@ -132,7 +132,10 @@ class _Export:
             for symbol, weight in problem.weights.items()
             for soft in [self.lowering.goal(symbol, problem.goal[symbol])]
         ]
-        for symbol, rest in problem.only(problem.weights).at_rest(level).items():
+        demanded = problem.only(problem.weights)
+        for symbol, rest in demanded.at_rest(level).items():
+            if symbol in demanded.goal:
+                continue
             soft = [goal for goal in problem.weights if problem.concerns(goal, symbol)]
             if soft:  # unless one of these soft goals is met, the symbol has to be at rest
                 ways = [(symbol, rest), *((goal, problem.goal[goal]) for goal in soft)]

@@ -19,7 +19,7 @@ from confab.reasoner.pddl.syntax import parse
 from confab.reasoner.pddl.turtle import turtle
 from confab.reasoner.pddl.words import PddlError
 from confab.reasoner.problem import Problem
-from confab.reasoner.symbols import TRUE, SituationType, Symbol
+from confab.reasoner.symbols import FALSE, TRUE, Parameter, Rule, SituationType, Symbol
 from worlds.writing import becomes, behavior, has, lacks, world
 
 COSTS = "(:functions (total-cost) (f))"
@@ -216,6 +216,24 @@ def test_a_symbol_whose_exported_soft_goal_is_unmet_has_to_be_at_rest(wish: str,
     exported = to_pddl(problem)
     again = imported(parse(exported.domain, exported.problem)).problem
     assert total(problem) == total(again) == least
+
+
+def test_a_symbol_of_a_hard_goal_need_not_be_at_rest_although_a_soft_goal_is_about_it_too() -> None:
+    sent = SituationType("SENT", ("Van",), "Truth", boolean=True, rest=FALSE)
+    home = SituationType("HOME", ("Van",), "Truth", boolean=True, default=FALSE)
+    problem = world(
+        [sent, home],
+        [behavior("SEND", 1, "?v:Van", [], [becomes("SENT", "?v", TRUE)])],
+        {"Van": ("van",)},
+        {},
+        {"SENT van": TRUE, "HOME van": TRUE},
+    )
+    rules = {"HOME": (Rule("HOME", (Parameter("?v", "Van"),), (), (lacks("SENT", "?v", TRUE),)),)}
+    problem = replace(problem, domain=replace(problem.domain, rules=rules))
+    problem = replace(problem, weights={Symbol("HOME", ("van",)): Fraction(1)})
+    exported = to_pddl(problem)
+    again = imported(parse(exported.domain, exported.problem)).problem
+    assert total(problem) == total(again) == 2
 
 
 FILL = """(:types tank) (:predicates (full) (done)) (:functions (total-cost) (level ?t - tank) (cap ?t - tank))
