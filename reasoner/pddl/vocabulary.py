@@ -11,7 +11,17 @@ from confab.reasoner.amounts import Amount, Calculation, Expression, Measure
 from confab.reasoner.language import walk
 from confab.reasoner.pddl.formulas import FALSE as NEVER
 from confab.reasoner.pddl.formulas import TRUE as ALWAYS
-from confab.reasoner.pddl.formulas import Arithmetic, Atom, Formula, FunctionTerm, NumericTerm, PddlTerm, both
+from confab.reasoner.pddl.formulas import (
+    Arithmetic,
+    Atom,
+    Compare,
+    Formula,
+    FunctionTerm,
+    Not,
+    NumericTerm,
+    PddlTerm,
+    both,
+)
 from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import TRUE, Behavior, Witness
 
@@ -237,7 +247,7 @@ class PddlNames:
                 return expression
 
     def there(self, expression: Expression, terms: Mapping[str, PddlTerm]) -> Iterator[Formula]:
-        """Yield the formulas which state that all amounts and measures in a numeric expression exist."""
+        """Yield the formulas which state that a numeric expression has a value: its parts exist, and no divisor is zero."""
         match expression:
             case Amount(situation, arguments):
                 yield self.exists(situation, self.terms(arguments, terms))
@@ -246,11 +256,26 @@ class PddlNames:
                 its = self.terms(arguments, terms)
                 if not all(row in rows for row in product(*(sorted(term.members) for term in its))):
                     yield self.static(f"has {relation}", f"has_{relation}", rows, its)
-            case Calculation(_, left, right):
+            case Calculation(sign, left, right):
                 yield from self.there(left, terms)
                 yield from self.there(right, terms)
+                if sign == "/" and self.may_be_zero(right):
+                    yield NEVER if right == 0 else Not(Compare("=", self.number(right, terms), Fraction(0)))
             case Fraction():
                 return
+
+    def may_be_zero(self, divisor: Expression) -> bool:
+        """Return whether a divisor may have the value 0."""
+        match divisor:
+            case Measure(relation):
+                return any(Fraction(row[-1]) == 0 for row in self.problem.relations.get(relation, ()))
+            case Amount(situation):
+                least = getattr(self.situations[situation].quantity, "least", None)
+                return least is None or least <= 0
+            case Calculation():
+                return True
+            case Fraction():
+                return divisor == 0
 
     def terms(self, names: Sequence[str], terms: Mapping[str, PddlTerm]) -> tuple[PddlTerm, ...]:
         """Return the PDDL terms for names of variables and individuals."""

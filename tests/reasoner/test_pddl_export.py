@@ -15,7 +15,7 @@ from confab.planner.plan import Status
 from confab.reasoner.aggregates.compiling import compiled
 from confab.reasoner.aggregates.dependencies import unfolded
 from confab.reasoner.aggregates.totals import with_totals
-from confab.reasoner.amounts import Amount, Measure, Quantity
+from confab.reasoner.amounts import Amount, Calculation, Expression, Measure, Quantity
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import OutOfTimeError
 from confab.reasoner.pddl.exporting import to_pddl
@@ -327,6 +327,31 @@ def test_an_amount_that_an_amount_scales_keeps_its_bounds_in_an_export(most: int
     scale = replace(behavior("SCALE", 1, "", [], []), amounts=(AmountEffect("N", (), "scale", Amount("RATE", ())),))
     kinds = [SituationType(name, (), name, quantity=Quantity(most=Fraction(most))) for name in ("N", "RATE")]
     problem = world(kinds, [grow, scale], {}, {"N": "2", "RATE": "1"}, {"N": ">=6"})
+    assert least(problem) == least(round_trip(problem)) == cost
+
+
+@pytest.mark.parametrize(
+    ("divisor", "negated", "cost"),
+    [
+        (Fraction(0), False, None),
+        (Fraction(0), True, 1.0),
+        (Amount("RATE", ()), False, 2.0),
+        (Amount("RATE", ()), True, 1.0),
+        (Calculation("-", Amount("RATE", ()), Amount("RATE", ())), False, None),
+    ],
+)
+def test_a_comparison_of_a_division_by_zero_is_false_in_an_export(
+    divisor: Expression, negated: bool, cost: float | None
+) -> None:
+    grow = replace(behavior("GROW", 1, "", [], []), amounts=(AmountEffect("RATE", (), "increase", Fraction(1)),))
+    small = Comparison(Calculation("/", Amount("RATE", ()), divisor), "<=", Fraction(5), negated)
+    end = behavior("END", 1, "", [small], [ValueEffect("ENDED", (), TRUE)])
+    ended = SituationType("ENDED", (), "Truth", boolean=True, default=FALSE)
+    kinds = [SituationType("RATE", (), "RATE", quantity=Quantity(least=Fraction(0), most=Fraction(3))), ended]
+    problem = world(kinds, [grow, end], {}, {"RATE": "0"}, {"ENDED": TRUE})
+    exported = to_pddl(problem)
+    read_by_unified_planning(exported.domain, exported.problem)
+    assert "/ (rate) 0" not in exported.domain
     assert least(problem) == least(round_trip(problem)) == cost
 
 
