@@ -16,8 +16,9 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, reduce
 from math import inf
+from operator import or_
 from typing import TypeAlias
 
 from confab.planner.plan import UngroundableError
@@ -39,6 +40,10 @@ Exact: TypeAlias = "int | Fraction"
 AmountVector: TypeAlias = "tuple[Exact, ...]"
 Push: TypeAlias = "Exact | None"
 """The change of a comparison's difference by an operator, or None if the change depends on the state."""
+REMEMBERED = 10_000
+"""Number of results that are remembered for operators with equal changes of amounts."""
+IMPOSSIBLE = -1
+"""Result of changes after which an amount is undefined or out of bounds."""
 
 
 @dataclass(frozen=True)
@@ -241,6 +246,8 @@ class Amounts:
     _number: dict[AmountVector, int] = field(default_factory=dict, repr=False)
     _masks: list[int] = field(default_factory=list, repr=False)
     _moves: dict[int, tuple[Move, ...]] = field(default_factory=dict, repr=False)
+    _results: dict[int, tuple[int, dict[int, int]]] = field(default_factory=dict, repr=False)
+    _alike: dict[tuple[Move, ...], tuple[int, dict[int, int]]] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         """Assign the number 0 to the initial tuple."""
@@ -295,9 +302,30 @@ class Amounts:
 
         Return None if a new amount is undefined or out of bounds.
         """
-        moves = self.made(operator)
-        if not moves:
+        asked, known = self._results.get(operator) or self._remembered(operator)
+        if not asked:
             return after
+        key = before & asked
+        found = known.get(key)
+        if found is None:
+            if len(known) >= REMEMBERED:
+                known.clear()
+            found = known[key] = self._moved(before, self.made(operator))
+        return None if found == IMPOSSIBLE else after & self.keep | found
+
+    def _remembered(self, operator: int) -> tuple[int, dict[int, int]]:
+        """Return the mask of the bits that new amounts depend on, and the known results of the operators with equal changes.
+
+        The mask is 0 if the operator changes no amount.
+        """
+        moves = self.made(operator)
+        if moves not in self._alike:
+            self._alike[moves] = reduce(or_, (move.when for move in moves), -1 << self.size) if moves else 0, {}
+        self._results[operator] = self._alike[moves]
+        return self._results[operator]
+
+    def _moved(self, before: int, moves: Sequence[Move]) -> int:
+        """Return the bits of comparisons and the number of the amounts after changes, or `IMPOSSIBLE`."""
         number = before >> self.size
         vector = self.vectors[number]
         new: dict[int, Exact] = {}
@@ -307,7 +335,7 @@ class Amounts:
                 continue
             position = move.position
             if move.by is None:
-                return None
+                return IMPOSSIBLE
             by, old = move.by.of(vector), new.get(move.place, vector[move.place])
             match move.operation:
                 case "assign":
@@ -322,9 +350,9 @@ class Amounts:
         for place, amount in new.items():
             changed[place] = simplified(amount)
             if not self.quantities[place].allows(changed[place]):
-                return None
+                return IMPOSSIBLE
         number = self.numbered(tuple(changed), self._masks[number], new)
-        return after & self.keep | self._masks[number] | number << self.size
+        return self._masks[number] | number << self.size
 
     def stated(self, state: int, values: State) -> int:
         """Return a state with the amounts that the mapping `values` contains."""

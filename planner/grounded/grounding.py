@@ -242,7 +242,7 @@ class _TaskBuilder:
             precondition, found = set(need[operator]), list[Move]()
             for relaxed in rows_of.get(operator, ()):
                 when = 0 if relaxed == operator else sum(1 << b for b in need[relaxed] if b not in precondition)
-                found += [replace(move, when=when) for move in moves[relaxed]]
+                found += [replace(move, when=when) if when else move for move in moves[relaxed]]
             return tuple(sorted(found, key=lambda move: move.position))
 
         amounts = (

@@ -15,11 +15,13 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from heapq import heappop, heappush
 from typing import NamedTuple, TypeAlias
 
-from confab.planner.grounded.amounts import AmountVector, Exact, Linear, Move, pushes
+from confab.planner.grounded.amounts import Exact, Linear, Move, pushes
+from confab.planner.grounded.derived_arrays import union
 from confab.planner.grounded.task import Task, bits_of
 
 MOST_TIMES = 1000
@@ -29,6 +31,11 @@ AmountPush: TypeAlias = "tuple[Linear, str, Exact | None]"
 
 The change is None if the change depends on the state.
 """
+
+Repetitions: TypeAlias = "tuple[int, ...]"
+"""The number of repetitions of each `AmountPush` in a state; 0 if no number suffices."""
+REMEMBERED = 1000
+"""Number of states whose evaluation is remembered. Only the bits that operators or the goal require, and the repetitions, count."""
 
 
 class Evaluation(NamedTuple):
@@ -53,44 +60,44 @@ Evaluate: TypeAlias = "Callable[[int], Evaluation | None]"
 def heuristic(task: Task) -> Evaluate:
     """Return the heuristic h_FF of a task as a function of a state."""
     needs, adds, owners, repeated = _relaxed(task)
-    operators, amounts, low = len(task), task.amounts, (1 << task.size) - 1
-    once = [0 if owner < 0 else 1 for owner in owners]
-    missing = [len(bits) for bits in needs]
-    always = [o for o, number in enumerate(missing) if not number]
-    needed_by = by_bit(needs, task.size)
     each = (sum(map(len, needs)) + sum(map(len, adds))) / max(len(needs), 1)
-    goal = bits_of(task.goal)
+    asked = union(1 << bit for bit in set(task.needs.items.tolist())) | task.goal
+    adds = _only(adds, asked)
+    operators, goal = len(task), bits_of(task.goal)
+    once = [0 if owner < 0 else 1 for owner in owners]
+    groups, missing, needed_by = _grouped(needs, task.size)
+    always = sorted(o for group, number in zip(groups, missing, strict=True) if not number for o in group)
     unreached = [-1] * task.size
 
-    def counted(state: int) -> tuple[list[int], set[int]]:
-        """Return the number of repetitions of each relaxed operator, and the useless operators.
-
-        A useless operator can't make its comparison true.
-        """
+    @lru_cache(REMEMBERED)
+    def counted(repetitions: Repetitions) -> tuple[list[int], set[int]]:
+        """Return the number of repetitions of each relaxed operator, and the operators that can't make their comparison true."""
         times, useless = once[:], set[int]()
-        if amounts is not None:
-            vector = amounts.vector(state)
-            for (difference, sign, push), found in repeated.items():
-                number = _times(difference.of(vector), sign, push)
-                for o in found:
-                    times[o] = number
-                if not number:
-                    useless.update(found)
+        for number, found in zip(repetitions, repeated.values(), strict=True):
+            for o in found:
+                times[o] = number
+            if not number:
+                useless.update(found)
         return times, useless
 
-    def evaluate(state: int) -> Evaluation | None:
-        times, useless = counted(state) if repeated else (once, None)
+    @lru_cache(REMEMBERED)
+    def evaluated(state: int, repetitions: Repetitions) -> Evaluation | None:
+        times, useless = counted(repetitions)
         left, cost, layer_of, supporter = missing[:], unreached[:], unreached[:], unreached[:]
-        layer = bits_of(state & low)
+        layer = bits_of(state)
         for bit in layer:
             cost[bit] = layer_of[bit] = 0
         reached, applicable, depth, number = always[:], None, 0, 0
         while True:
             for bit in layer:
-                for o in needed_by[bit]:
-                    left[o] -= 1
-                    if not left[o]:
-                        reached.append(o)
+                ready: list[int] = []
+                for group in needed_by[bit]:
+                    left[group] -= 1
+                    if not left[group]:
+                        ready += groups[group]
+                if ready:
+                    ready.sort()
+                    reached += ready
             if applicable is None:
                 applicable = [o for o in reached if o < operators]
             if useless:
@@ -126,7 +133,8 @@ def heuristic(task: Task) -> Evaluate:
             plan = [o for o in plan for _ in range(chosen[o][1])]
         return Evaluation(len(plan), plan, applicable, 1 + round(number * each))
 
-    return evaluate
+    repetitions = _repetitions(task, repeated)
+    return lambda state: evaluated(state & asked, repetitions(state))
 
 
 def cost_left(task: Task) -> Callable[[int], float]:
@@ -136,36 +144,42 @@ def cost_left(task: Task) -> Callable[[int], float]:
     """
     needs, adds, owners, repeated = _relaxed(task)
     costs = [0.0 if owner < 0 else task.costs[owner] for owner in owners]
-    masks = [sum(1 << bit for bit in bits) for bits in needs]
-    needed_by = by_bit(needs, task.size)
-    low, goal = (1 << task.size) - 1, bits_of(task.goal)
-    prices: dict[AmountVector, list[float]] = {}
+    asked = _relevant(needs, adds, task)
+    adds = _only(adds, asked)
+    groups, missing, needed_by = _grouped([bits if adds[o] else [] for o, bits in enumerate(needs)], task.size)
+    groups = [[o for o in group if adds[o]] for group in groups]
+    always = sorted(o for group, number in zip(groups, missing, strict=True) if not number for o in group)
+    goal = bits_of(task.goal)
 
-    def priced(vector: AmountVector) -> list[float]:
+    @lru_cache(REMEMBERED)
+    def priced(repetitions: Repetitions) -> list[float]:
         """Return the cost of each operator with its repetitions.
 
         The cost is infinite if the operator can't make its comparison true.
         """
         price = costs[:]
-        for (difference, sign, push), found in repeated.items():
-            times = _times(difference.of(vector), sign, push) or math.inf
+        for number, found in zip(repetitions, repeated.values(), strict=True):
+            times = number or math.inf
             for o in found:
                 price[o] = times * costs[o] if costs[o] or times < math.inf else math.inf
         return price
 
-    def left(state: int) -> float:
-        price = costs
-        if task.amounts is not None:
-            vector = task.amounts.vector(state)
-            price = prices.get(vector) or prices.setdefault(vector, priced(vector))
-        absent = low & ~state
-        open_ = [(mask & absent).bit_count() for mask in masks]
+    @lru_cache(REMEMBERED)
+    def left(state: int, repetitions: Repetitions) -> float:
+        price, open_ = priced(repetitions), missing[:]
         reached, supporter = [math.inf] * task.size, [-1] * task.size
-        for bit in bits_of(state & low):
+        held = bits_of(state)
+        for bit in held:
             reached[bit] = 0.0
-        queue: list[tuple[float, int]] = []
         wanted = {bit for bit in goal if reached[bit]}
-        ready = [o for o, number in enumerate(open_) if not number]
+        ready = always[:]
+        for bit in held:
+            for group in needed_by[bit]:
+                open_[group] -= 1
+                if not open_[group]:
+                    ready += groups[group]
+        ready.sort()
+        queue: list[tuple[float, int]] = []
         while True:
             for o in ready:
                 total = price[o]
@@ -181,10 +195,11 @@ def cost_left(task: Task) -> Callable[[int], float]:
             ready = []
             if cost <= reached[bit]:
                 wanted.discard(bit)
-                for o in needed_by[bit]:
-                    open_[o] -= 1
-                    if not open_[o]:
-                        ready.append(o)
+                for group in needed_by[bit]:
+                    open_[group] -= 1
+                    if not open_[group]:
+                        ready += groups[group]
+                ready.sort()
         if wanted:
             return math.inf
         chosen: dict[int, float] = {}
@@ -192,7 +207,58 @@ def cost_left(task: Task) -> Callable[[int], float]:
             chosen[owners[o]] = max(chosen.get(owners[o], 0.0), price[o])
         return sum(chosen.values())
 
-    return left
+    repetitions = _repetitions(task, repeated)
+    return lambda state: left(state & asked, repetitions(state))
+
+
+def _repetitions(task: Task, repeated: Mapping[AmountPush, object]) -> Callable[[int], Repetitions]:
+    """Return a function from a state to the number of repetitions of each `AmountPush`."""
+    amounts, known = task.amounts, dict[int, Repetitions]()
+    if amounts is None or not repeated:
+        return lambda state: ()
+    same = dict[Repetitions, Repetitions]()
+
+    def of(state: int) -> Repetitions:
+        found = known.get(state >> amounts.size)
+        if found is None:
+            vector = amounts.vector(state)
+            found = tuple(_times(difference.of(vector), sign, push) for difference, sign, push in repeated)
+            found = known[state >> amounts.size] = same.setdefault(found, found)
+        return found
+
+    return of
+
+
+def _relevant(needs: Sequence[Sequence[int]], adds: Sequence[Sequence[int]], task: Task) -> int:
+    """Return the mask of the bits that the goal requires, directly or through relaxed operators."""
+    setters = by_bit(adds, task.size)
+    waiting = bits_of(task.goal)
+    found, seen = set(waiting), set[int]()
+    for bit in waiting:  # the loop appends bits to the list
+        for o in setters[bit]:
+            if o not in seen:
+                seen.add(o)
+                fresh = [need for need in needs[o] if need not in found]
+                found.update(fresh)
+                waiting += fresh
+    return union(1 << bit for bit in found)
+
+
+def _only(lists: Sequence[Sequence[int]], mask: int) -> list[list[int]]:
+    """Return the bits of each list that are in a mask."""
+    asked = set(bits_of(mask))
+    return [[bit for bit in bits if bit in asked] for bits in lists]
+
+
+def _grouped(needs: Sequence[Sequence[int]], size: int) -> tuple[list[list[int]], list[int], list[list[int]]]:
+    """Return groups of relaxed operators that require the same bits.
+
+    Also return the number of bits that each group requires, and, for each bit, the groups that require the bit.
+    """
+    groups = dict[tuple[int, ...], list[int]]()
+    for o, bits in enumerate(needs):
+        groups.setdefault(tuple(bits), []).append(o)
+    return list(groups.values()), [len(bits) for bits in groups], by_bit(list(groups), size)
 
 
 def by_bit(lists: Sequence[Sequence[int]], size: int) -> list[list[int]]:

@@ -457,7 +457,7 @@ class _Windows:
 
         In a state with amounts, the number of the tuple of amounts is stored above the bits of the whole task.
         """
-        task, of = self.task, amounts.moves
+        task, of = self.task, amounts.made
         place = {operator: i for i, operator in enumerate(operators)}
         rows = [*self._rows(operators), *self._conditional.get(-1, ())]
         return replace(
@@ -472,7 +472,7 @@ class _Windows:
             change=lambda operator: task.changes_of(operators[operator]),
             describe=lambda operator: task.describe(operators[operator]),
             barred=set(),
-            amounts=replace(amounts, moves=lambda operator: of(operators[operator]), _moves={}),
+            amounts=replace(amounts, moves=lambda operator: of(operators[operator]), _moves={}, _results={}),
             _changes={},
         )
 

@@ -29,7 +29,7 @@ def shortage(task: Task) -> Reason | None:
     if amounts is None:
         return None
     vector = amounts.vector(task.initial)
-    moves = {o: found for o in range(len(task)) if (found := amounts.moves(o))}
+    moves = {o: found for o in range(len(task)) if (found := amounts.made(o))}
     for (difference, sign), bit in amounts.bits.items():
         if (task.goal & ~task.initial) >> bit & 1 and len(difference.terms) == 1:
             place, factor = difference.terms[0]

@@ -7,9 +7,11 @@ branch is created when a state first reaches the branch, because a search visits
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import itemgetter
 
 import numpy as np
 
+from confab.planner.grounded.derived_arrays import union
 from confab.planner.grounded.joins import Ints
 from confab.reasoner.limits import check
 
@@ -18,65 +20,57 @@ Waiting = tuple[int, list[int], int]
 
 
 class SuccessorTree:
-    """A node of a decision tree that tests one symbol.
+    """A node of a decision tree that tests symbols one after another.
 
-    `mask` contains the bits of the symbol. `by_value` maps each value of the symbol to a subtree. `otherwise` is the
-    subtree of operators without a test of the symbol. `operators` are the operators that need no further test.
-    `waiting` contains operators that aren't in a subtree yet.
+    `tests` is the number of tested symbols, and `mask` contains the bits of their tested values. `by_bit` maps each such bit to the
+    position of its test and a subtree. `operators` are the operators that need no further test. `waiting` contains operators that
+    aren't in a subtree yet.
     """
 
-    __slots__ = ("by_value", "mask", "masks", "operators", "otherwise", "waiting")
+    __slots__ = ("by_bit", "mask", "masks", "operators", "tests", "waiting")
 
     def __init__(self, masks: Sequence[int], waiting: list[Waiting]) -> None:
         self.masks, self.waiting = masks, waiting
-        self.mask = 0
-        self.by_value: dict[int, SuccessorTree] = {}
-        self.otherwise: SuccessorTree | None = None
+        self.mask, self.tests = 0, 0
+        self.by_bit: dict[int, tuple[int, SuccessorTree]] = {}
         self.operators: list[int] = []
 
     def of(self, state: int) -> tuple[list[int], int]:
-        """Return the applicable operators of a state, and the number of visited nodes."""
+        """Return the applicable operators of a state, and the number of tests."""
         found: list[int] = []
-        visited = 0
-        heads = [self]
-        for head in heads:  # the loop appends nodes to the list
-            node: SuccessorTree | None = head
-            while node is not None:
-                visited += 1
-                if node.waiting:
-                    check("searching")
-                    node._branch()
-                if node.operators:
-                    found += node.operators
-                if not node.mask:
-                    break
-                fitting = node.by_value.get(state & node.mask)
-                if fitting is not None:
-                    heads.append(fitting)
-                node = node.otherwise
-        return found, visited
+        tests = 0
+        nodes = [self]
+        for node in nodes:  # the loop appends nodes to the list
+            if node.waiting:
+                check("searching")
+                node._branch()
+            found += node.operators
+            tests += node.tests or 1
+            fitting = state & node.mask
+            if fitting:
+                by_bit, subtrees = node.by_bit, []
+                while fitting:
+                    bit = fitting & -fitting
+                    fitting ^= bit
+                    subtrees.append(by_bit[bit])
+                subtrees.sort(key=itemgetter(0))
+                nodes += [subtree for _, subtree in subtrees]
+        return found, tests
 
     def _branch(self) -> None:
-        """Distribute the waiting operators over subtrees.
-
-        The node tests the symbol that the first waiting operator tests next. A chain of further nodes tests the next symbols of
-        the other operators.
-        """
-        masks = self.masks
+        """Distribute the waiting operators over subtrees; an operator waits for the symbol that it requires next."""
         tests: dict[int, dict[int, list[Waiting]]] = {}
         for operator, bits, asked in self.waiting:
             if asked == len(bits):
                 self.operators.append(operator)
             else:
                 bit = bits[asked]
-                tests.setdefault(masks[bit], {}).setdefault(bit, []).append((operator, bits, asked + 1))
-        self.waiting = []
-        node = self
-        for mask, by_bit in tests.items():
-            if node.mask:
-                node.otherwise = node = SuccessorTree(masks, [])
-            node.mask = mask
-            node.by_value = {1 << bit: SuccessorTree(masks, waiting) for bit, waiting in by_bit.items()}
+                tests.setdefault(self.masks[bit], {}).setdefault(bit, []).append((operator, bits, asked + 1))
+        self.waiting, self.tests = [], len(tests)
+        for position, by_bit in enumerate(tests.values()):
+            for bit, waiting in by_bit.items():
+                self.by_bit[1 << bit] = position, SuccessorTree(self.masks, waiting)
+        self.mask = union(self.by_bit)
 
 
 def tree(starts: Ints, items: Ints, masks: Sequence[int]) -> SuccessorTree:

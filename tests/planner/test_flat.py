@@ -17,7 +17,7 @@ from confab.planner.grounded.best_first import Search, plan_level, search
 from confab.planner.grounded.exploring import SearchOrder, explore, path_to
 from confab.planner.grounded.greedy import Greedy
 from confab.planner.grounded.grounding import ground
-from confab.planner.grounded.hff import Evaluate, Evaluation, heuristic
+from confab.planner.grounded.hff import Evaluate, Evaluation, cost_left, heuristic
 from confab.planner.grounded.landmarks import landmarks
 from confab.planner.grounded.lookahead import lookahead
 from confab.planner.grounded.novelty import Novelty
@@ -199,6 +199,37 @@ def test_the_tree_gives_the_operators_that_are_applicable(tabletop: Problem) -> 
             if not operators:
                 break
             state = task.applied(state, choice.choice(operators)) or 0
+
+
+def test_the_evaluation_of_a_state_does_not_depend_on_the_states_before_it() -> None:
+    domain = """(define (domain haul) (:requirements :typing :numeric-fluents :conditional-effects)
+     (:types place cart) (:predicates (way ?p ?q - place) (at ?c - cart ?p - place) (wet ?p - place) (dock ?p - place)
+      (done ?p - place))
+     (:functions (power ?c - cart) (driven))
+     (:action go :parameters (?c - cart ?p ?q - place) :precondition (and (way ?p ?q) (at ?c ?p) (>= (power ?c) 2))
+      :effect (and (at ?c ?q) (not (at ?c ?p)) (decrease (power ?c) 1) (increase (driven) 1)
+                   (when (wet ?q) (decrease (power ?c) 1))))
+     (:action charge :parameters (?c - cart ?p - place) :precondition (and (at ?c ?p) (dock ?p)) :effect (assign (power ?c) 9))
+     (:action dry :parameters (?c - cart ?p - place) :precondition (and (at ?c ?p) (>= (power ?c) 1))
+      :effect (and (not (wet ?p)) (done ?p) (decrease (power ?c) 1))))"""
+    text = """(define (problem p) (:domain haul) (:objects a b c d - place x y - cart)
+     (:init (way a b) (way b a) (way b c) (way c b) (way c d) (way d c) (at x a) (at y d) (wet b) (wet c) (dock a) (dock b)
+            (= (power x) 9) (= (power y) 4) (= (driven) 0)) (:goal (and (done b) (done c) (at y a) (>= (power y) 3))))"""
+    problem = imported(parse(domain, text)).problem
+    task, choice = ground(problem), random.Random(3)
+    assert isinstance(task, Task) and task.amounts is not None
+    evaluate, cost, state, walk = heuristic(task), cost_left(task), task.initial, list[int]()
+    for _ in range(30):
+        assert evaluate(state) == heuristic(task)(state) and cost(state) == cost_left(task)(state)
+        operators = task.applicable(state)[0]
+        if not operators:  # no power is left
+            state, walk = task.initial, []
+            continue
+        walk.append(choice.choice(operators))
+        after, fresh = task.applied(state, walk[-1]), ground(problem)
+        assert after is not None and isinstance(fresh, Task)
+        assert task.values(after) == fresh.values(fresh.carried_out(fresh.initial, walk)[0])
+        state = after
 
 
 def test_facts_that_hold_in_every_plan_are_landmarks() -> None:
