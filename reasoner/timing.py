@@ -11,7 +11,6 @@ import re
 from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from itertools import product
 
 from confab.reasoner.afterwards import Afterwards, Simplified, TooManyCasesError, closed
 from confab.reasoner.amounts import (
@@ -84,14 +83,14 @@ def projected(
     """
     spans = tuple(Span)
 
-    def overwritten(span: Span, effect: Effect) -> bool:
-        return any(
-            spans.index(other) > spans.index(span)
-            and (e.situation, e.arguments) == (effect.situation, effect.arguments)
-            for other, e in effects
-            if (isinstance(e, ValueEffect) or e.operation == "assign") and not e.when and not e.each
-        )
-
+    certain = sorted(
+        ((spans.index(span), one) for span, one in effects if not one.when and not one.each), key=lambda pair: pair[0]
+    )
+    set_last = {
+        (one.situation, one.arguments): at
+        for at, one in certain
+        if isinstance(one, ValueEffect) or one.operation == "assign"
+    }
     made = {span: [e for its, e in effects if its is span] for span in spans}
     amounts: dict[Span, dict[Amount, Expression]] = {}
     now = dict[Amount, Expression]()
@@ -109,19 +108,18 @@ def projected(
         found = before(span, condition)
         return found if given is None or found != (condition,) else given(span, condition, effect)
 
-    changes = [(spans.index(at), e) for at, e in effects if isinstance(e, AmountEffect) and not e.when and not e.each]
-    mixed = {
-        Amount(one.situation, one.arguments): None
-        for (at, one), (later, other) in product(changes, changes)
-        if at < later and one.operation in ("increase", "decrease") and other.operation == "scale"
-        if (one.situation, one.arguments) == (other.situation, other.arguments)
-    }
+    changes = [(at, one, Amount(one.situation, one.arguments)) for at, one in certain if isinstance(one, AmountEffect)]
+    scaled_last = {cell: at for at, one, cell in changes if one.operation == "scale"}
+    mixed = dict.fromkeys(
+        cell for at, one, cell in changes if one.operation in ("increase", "decrease") and at < scaled_last.get(cell, 0)
+    )
     asked = dict.fromkeys(one for span, condition in conditions for one in before(span, condition))
     found = list[Effect]()
     for span, effect in effects:
         when = tuple(one for condition in effect.when for one in required(span, condition, effect))
         cell = Amount(effect.situation, effect.arguments)
-        if overwritten(span, effect) or (cell in mixed and not effect.when and not effect.each):
+        overwritten = spans.index(span) < set_last.get((effect.situation, effect.arguments), 0)
+        if overwritten or (cell in mixed and not effect.when and not effect.each):
             continue
         if isinstance(effect, AmountEffect):
             effect = replace(effect, amount=with_amounts(effect.amount, amounts[span]))

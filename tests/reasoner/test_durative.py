@@ -1,7 +1,9 @@
 """PDDL 2.1: durative actions and timed initial literals become scenes; unified-planning's validator accepts their plans."""
 
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from time import process_time
 
 import pytest
 
@@ -17,8 +19,8 @@ from confab.reasoner.pddl.importing import Imported, imported
 from confab.reasoner.pddl.syntax import parse
 from confab.reasoner.pddl.turtle import turtle
 from confab.reasoner.pddl.words import PddlError
-from confab.reasoner.symbols import Span
-from confab.reasoner.timing import only_during
+from confab.reasoner.symbols import FALSE, TRUE, Span, ValueEffect
+from confab.reasoner.timing import only_during, projected
 from confab.trees import behavior_tree
 
 EPSILON = Fraction(1, 1000)
@@ -256,3 +258,11 @@ def test_a_condition_of_an_effect_at_the_end_is_judged_at_the_end(
         assert set(read.problem.domain.behaviors[name].every_effect) == set(behavior.every_effect)
     plan = read.plan(optimal=True).outcome.plan
     assert (plan and [step.behavior for step in plan.primitives]) == steps
+
+
+def test_the_effects_of_a_step_on_many_individuals_are_ordered_in_proportion_to_their_number() -> None:
+    begun = [(Span.START, ValueEffect("P", (f"i{i}",), TRUE)) for i in range(10_000)]
+    ended = [(Span.END, replace(effect, value=FALSE)) for _, effect in begun]
+    begin = process_time()
+    assert projected((), [*begun, *ended]) == ((), tuple(effect for _, effect in ended))
+    assert process_time() - begin < 5.0
