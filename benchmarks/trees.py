@@ -83,7 +83,7 @@ def by_btcpp(problem: Problem, tree: Tree, path: Path, runner: Path) -> tuple[bo
                 done.append(str(leaf))
                 said = world.execute(leaf).ok
             else:
-                said = tree.asks(key, Situation(problem, world.observe()))
+                said = Situation(problem, world.observe()).asks(leaf)
             process.stdin.write(f"{int(said)}\n")
             process.stdin.flush()
     return False, done

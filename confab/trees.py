@@ -7,24 +7,12 @@ import re
 import runpy
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from confab.planner.acting.world import World
-from confab.planner.behavior_tree import (
-    All,
-    Assign,
-    Compared,
-    Do,
-    First,
-    Holds,
-    Situation,
-    Subtree,
-    Together,
-    TreeNode,
-    mark,
-)
+from confab.planner.behavior_tree import Element, Leaf, Situation, mark, sequence
 from confab.planner.behavior_tree import behavior_tree as tree_of
 from confab.planner.plan import Plan, Step
 from confab.reasoner.files import check_replaceable, made_folder, write_whole
@@ -56,22 +44,6 @@ TREES = {MAIN, "position", "plan", "undone_steps"}
 
 
 @dataclass(frozen=True)
-class Element:
-    """A node of a behaviour tree, of a kind that both BehaviorTree.CPP and py_trees support.
-
-    The kinds are Fallback, Sequence, Once, Parallel, SubTree, Check, Set, Again, Condition and Action. The nodes Fallback and
-    Sequence begin with their first child in each tick. A Once node is a sequence that resumes at its running child. `name` is the
-    name of a subtree, a leaf or a variable; a variable has a number. `key` identifies a leaf.
-    """
-
-    kind: str
-    name: str = ""
-    children: tuple[Element, ...] = ()
-    ports: Mapping[str, str] = field(default_factory=dict)
-    key: str = ""
-
-
-@dataclass(frozen=True)
 class Tree:
     """The behaviour tree of a plan.
 
@@ -82,21 +54,14 @@ class Tree:
     first: str
     then: str
     subtrees: Mapping[str, Element]
-    leaves: Mapping[str, Fact | Condition | Step]
-
-    def asks(self, key: str, situation: Situation) -> bool:
-        """Return whether the condition of a leaf, or the preconditions of its primitive, hold in a situation."""
-        leaf = self.leaves[key]
-        if isinstance(leaf, Step):
-            return situation.can(leaf)
-        return situation.holds(Holds((leaf,)) if isinstance(leaf, Fact) else Holds(conditions=(leaf,)))
+    leaves: Mapping[str, Leaf]
 
 
 def behavior_tree(problem: Problem, plan: Plan) -> Tree:
     """Return the behaviour tree of a valid plan, with nodes that both BehaviorTree.CPP and py_trees support."""
     if needs_others_meanwhile(problem):
         raise KnowledgeError("steps of this plan must overlap; a behaviour tree executes one step after another")
-    lowering = _ElementWriter(problem)
+    lowering = _LeafWriter(problem)
     first, then = (lowering.lowered(tree).name for tree in tree_of(problem, plan))
     return Tree(first, then, lowering.subtrees, lowering.leaves)
 
@@ -113,13 +78,17 @@ def export_trees(problem: Problem, plan: Plan, folder: Path) -> tuple[Path, Path
     return paths
 
 
-class _ElementWriter:
-    """Conversion of the nodes of a plan's behaviour tree into elements, in which leaves are numbered."""
+class _LeafWriter:
+    """Separates the subtrees of a plan's behaviour tree, and gives names, ports and keys to its leaves.
+
+    The nodes Fallback and Sequence begin with their first child in each tick. A Once node is a sequence that resumes at its running
+    child. After an Again node, the tree is ticked again.
+    """
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.subtrees: dict[str, Element] = {}
-        self.leaves: dict[str, Fact | Condition | Step] = {}
+        self.leaves: dict[str, Leaf] = {}
         behaviors, situations = problem.domain.behaviors, problem.domain.situations
         wanted = [(("Action", one), _identifier(one)) for one in behaviors]
         wanted += [(("possible", one), f"{_identifier(one)}_possible") for one in behaviors]
@@ -130,36 +99,25 @@ class _ElementWriter:
             self.names[key] = _free(name, self.taken)
             self.taken.add(self.names[key])
 
-    def lowered(self, node: TreeNode) -> Element:
-        """Return the element of a library for a node of the plan's behaviour tree."""
+    def lowered(self, node: Element) -> Element:
+        """Return a node with complete leaves; a primitive becomes a condition, an action, its mark, and a request for a tick."""
         check("exporting the behaviour tree")
-        match node:
-            case Holds(facts, conditions):
-                leaves = [self.leaf("Condition", *self.words(one), one) for one in (*facts, *conditions)]
-                return leaves[0] if len(leaves) == 1 else Element("Sequence", children=tuple(leaves))
-            case Do(step):
-                ports = self.ports(step)
-                possible = self.leaf("Condition", self.names["possible", step.behavior], ports, step)
-                action = self.leaf("Action", self.names["Action", step.behavior], ports, step)
-                once = Element("Once", children=(possible, action))
-                return Element("Sequence", children=(once, self.lowered(mark(step.path, 1)), Element("Again")))
-            case Compared(variable, comparison, number):
-                return Element("Check", variable, ports={"comparison": comparison, "number": str(number)})
-            case Assign(variable, number):
-                return Element("Set", variable, ports={"number": str(number)})
-            case All(nodes):
-                return Element("Sequence", children=tuple(map(self.lowered, nodes)))
-            case First(nodes):
-                return Element("Fallback", children=tuple(map(self.lowered, nodes)))
-            case Together(nodes):
-                return Element("Parallel", children=tuple(map(self.lowered, nodes)))
-            case Subtree(name, child):
-                own = _free(_identifier(name), self.taken - TREES)  # names can't have spaces in the libraries
-                self.subtrees[own] = Element("")  # the entry keeps the subtree before its nested subtrees
-                self.subtrees[own] = self.lowered(child)
-                return Element("SubTree", own)
+        if node.kind == "SubTree":
+            own = _free(_identifier(node.name), self.taken - TREES)  # names can't have spaces in the libraries
+            self.subtrees[own] = Element("")  # the entry keeps the subtree before its nested subtrees
+            self.subtrees[own] = self.lowered(node.children[0])
+            return Element("SubTree", own)
+        leaf = node.leaf
+        if isinstance(leaf, Step):
+            ports = self.ports(leaf)
+            possible = self.leaf("Condition", self.names["possible", leaf.behavior], ports, leaf)
+            action = self.leaf("Action", self.names["Action", leaf.behavior], ports, leaf)
+            return sequence(Element("Once", children=(possible, action)), mark(leaf.path, 1), Element("Again"))
+        if leaf is not None:
+            return self.leaf("Condition", *self.words(leaf), leaf)
+        return replace(node, children=tuple(map(self.lowered, node.children)))
 
-    def leaf(self, kind: str, name: str, ports: Mapping[str, str], what: Fact | Condition | Step) -> Element:
+    def leaf(self, kind: str, name: str, ports: Mapping[str, str], what: Leaf) -> Element:
         """Return a new leaf with a unique key."""
         key = f"{kind[0].lower()}{len(self.leaves)}"
         self.leaves[key] = what
@@ -358,7 +316,7 @@ def filled(
         def update(self) -> Status:
             if self.kind == "Condition":
                 seen = Situation(problem, {**unseen, **world.observe()})
-                return Status.SUCCESS if tree.asks(self.key, seen) else Status.FAILURE
+                return Status.SUCCESS if seen.asks(tree.leaves[self.key]) else Status.FAILURE
             step = tree.leaves[self.key]
             assert isinstance(step, Step)
             if observer is not None:

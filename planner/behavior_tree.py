@@ -18,7 +18,7 @@ abstract step are a subtree.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import product
 from typing import TypeAlias
@@ -37,102 +37,76 @@ from confab.reasoner.symbols import Condition, Fact, State, Symbol, ValueConditi
 
 
 @dataclass(frozen=True)
-class Holds:
-    """A condition leaf that succeeds if some facts, or some ground conditions, hold."""
+class Element:
+    """A node of a behaviour tree, of a kind that both BehaviorTree.CPP and py_trees support.
 
-    facts: tuple[Fact, ...] = ()
-    conditions: tuple[Condition, ...] = ()
+    In each tick, Sequence ticks its children one after another until one fails, Fallback until one succeeds, and Parallel ticks all
+    children. A SubTree has a name and one child. Check compares a variable with a number, and Set gives a number to a variable. The
+    leaves are Condition and Action, with the fact, the condition or the primitive in `leaf`. `confab.trees` adds the kinds Once and
+    Again, and the names, the ports and the keys of leaves.
+    """
 
-
-@dataclass(frozen=True)
-class Do:
-    """An action leaf: a primitive is executed if its preconditions hold, and marked as done; then the tree is ticked again."""
-
-    step: Step
-
-
-@dataclass(frozen=True)
-class Compared:
-    """A condition leaf that compares a variable of the tree with a number: >= or <."""
-
-    variable: str
-    comparison: str
-    number: int
-
-
-@dataclass(frozen=True)
-class Assign:
-    """A node that gives a number to a variable of the tree, and succeeds."""
-
-    variable: str
-    number: int
-
-
-@dataclass(frozen=True)
-class All:
-    """A sequence node: the children are ticked one after another, until one child fails."""
-
-    children: tuple[TreeNode, ...]
-
-
-@dataclass(frozen=True)
-class First:
-    """A fallback node: the children are ticked one after another, until one child succeeds."""
-
-    children: tuple[TreeNode, ...]
-
-
-@dataclass(frozen=True)
-class Together:
-    """A parallel node: the children are ticked at the same time and must all succeed."""
-
-    children: tuple[TreeNode, ...]
-
-
-@dataclass(frozen=True)
-class Subtree:
-    """A named subtree: an attempt, the nodes that find its first position or take marks away, or the sub-steps of a step."""
-
-    name: str
-    child: TreeNode
+    kind: str
+    name: str = ""
+    children: tuple[Element, ...] = ()
+    ports: Mapping[str, str] = field(default_factory=dict, hash=False)
+    key: str = ""
+    leaf: Leaf | None = None
 
 
 Path: TypeAlias = "tuple[int, ...]"
-TreeNode: TypeAlias = "Holds | Do | Compared | Assign | All | First | Together | Subtree"
-
-
+Leaf: TypeAlias = "Fact | Condition | Step"
 POSITION = "position"
 """The variable with the number of primitives that are done when an attempt begins."""
 
 
-def done(path: Path) -> Compared:
+def sequence(*children: Element) -> Element:
+    """Return a node that ticks its children until one of them fails."""
+    return Element("Sequence", children=children)
+
+
+def fallback(*children: Element) -> Element:
+    """Return a node that ticks its children until one of them succeeds."""
+    return Element("Fallback", children=children)
+
+
+def compared(variable: str, comparison: str, number: int) -> Element:
+    """Return the condition that a variable of the tree is at least a number (>=), or less than the number (<)."""
+    return Element("Check", variable, ports={"comparison": comparison, "number": str(number)})
+
+
+def assigned(variable: str, number: int) -> Element:
+    """Return a node that gives a number to a variable of the tree, and succeeds."""
+    return Element("Set", variable, ports={"number": str(number)})
+
+
+def holds(facts: Iterable[Fact], conditions: Iterable[Condition] = ()) -> Element:
+    """Return the node that succeeds if some facts and some ground conditions hold."""
+    leaves = [Element("Condition", leaf=one) for one in (*facts, *conditions)]
+    return leaves[0] if len(leaves) == 1 else sequence(*leaves)
+
+
+def done(path: Path) -> Element:
     """Return the condition that the primitive at a path is marked as done."""
-    return Compared("done_" + "_".join(map(str, path)), ">=", 1)
+    return compared("done_" + "_".join(map(str, path)), ">=", 1)
 
 
-def mark(path: Path, number: int) -> Assign:
+def mark(path: Path, number: int) -> Element:
     """Return the node that marks the primitive at a path as done (1), or takes the mark away (0)."""
-    return Assign(done(path).variable, number)
+    return assigned(done(path).name, number)
 
 
-def behavior_tree(problem: Problem, plan: Plan) -> tuple[Subtree, Subtree]:
+def behavior_tree(problem: Problem, plan: Plan) -> tuple[Element, Element]:
     """Return two trees of a valid plan: one finds the position at which an attempt begins, the other is ticked until it succeeds.
 
     The plan begins in the problem's initial state. The trees ignore the soft goals that the plan leaves unmet.
     """
     problem = problem.only(unmet_goals(problem, plan))
     tree = _TreeBuilder(problem, plan)
-    goal = Holds((*(Fact(symbol, value) for symbol, value in sorted(problem.goal.items())), *tree.at_rest()))
-    marking = Subtree("undone steps", All(tree.unmarking()))
-    attempt = First((goal, All((marking, *tree.in_order(plan.steps), goal))))
-    return Subtree("position", All(tuple(tree.positioning()))), Subtree("plan", attempt)
-
-
-def children(node: TreeNode) -> tuple[TreeNode, ...]:
-    """Return the children of a node."""
-    if isinstance(node, All | First | Together):
-        return node.children
-    return (node.child,) if isinstance(node, Subtree) else ()
+    goal = holds((*(Fact(symbol, value) for symbol, value in sorted(problem.goal.items())), *tree.at_rest()))
+    marking = Element("SubTree", "undone steps", (sequence(*tree.unmarking()),))
+    attempt = fallback(goal, sequence(marking, *tree.in_order(plan.steps), goal))
+    return Element("SubTree", "position", (sequence(*tree.positioning()),)), Element("SubTree", "plan", (attempt,))
 
 
 class _TreeBuilder:
@@ -163,34 +137,31 @@ class _TreeBuilder:
         rests = ((symbol, self.problem.domain.situations[symbol.situation].rest) for symbol in sorted(changed))
         return [Fact(symbol, rest) for symbol, rest in rests if rest is not None and not self.problem.releases(symbol)]
 
-    def positioning(self) -> list[TreeNode]:
-        """Return the nodes that find the latest position at which all links across it are satisfied, and set the marks.
+    def positioning(self) -> Iterator[Element]:
+        """Yield the nodes that find the latest position at which all links across it are satisfied, and set the marks.
 
         The links are tested from the last consumer to the first. Therefore each link has to be tested only once.
         """
         end = len(self.position)
         links = [(self.position.get(need.by, end), path, need) for path in self.position for need in self.needs[path]]
-        nodes: list[TreeNode] = [Assign(POSITION, end)]
+        yield assigned(POSITION, end)
         for consumer, path, need in sorted(links, key=lambda link: link[:2], reverse=True):
             producer = self.position[path]
-            within = (
-                Compared(POSITION, "<", producer + 1),
-                *([Compared(POSITION, ">=", consumer + 1)] if need.by else []),
-            )
-            nodes.append(First((*within, self.facts(path, need), Assign(POSITION, producer))))
+            later = [compared(POSITION, ">=", consumer + 1)] if need.by else []
+            before = compared(POSITION, "<", producer + 1)
+            yield fallback(before, *later, self.facts(path, need), assigned(POSITION, producer))
         for path, number in self.position.items():
             if self.needs[path]:
-                nodes.append(mark(path, 0))
-                nodes.append(First((Compared(POSITION, "<", number + 1), mark(path, 1))))
-        return nodes
+                yield mark(path, 0)
+                yield fallback(compared(POSITION, "<", number + 1), mark(path, 1))
 
-    def unmarking(self) -> tuple[TreeNode, ...]:
-        """Return the nodes that take the marks from primitives with unsatisfied links, the last primitive first."""
+    def unmarking(self) -> Iterator[Element]:
+        """Yield the nodes that take the marks from primitives with unsatisfied links, the last primitive first."""
         needed = [path for path in self.position if self.needs[path]]
-        return tuple(First((self.kept([path]), mark(path, 0))) for path in reversed(needed))
+        return (fallback(self.kept([path]), mark(path, 0)) for path in reversed(needed))
 
-    def in_order(self, steps: Iterable[Step]) -> tuple[TreeNode, ...]:
-        """Return the nodes of sibling steps; consecutive steps that are independent are parallel."""
+    def in_order(self, steps: Iterable[Step]) -> Iterator[Element]:
+        """Yield the nodes of sibling steps; consecutive steps that are independent are parallel."""
         groups: list[list[Step]] = []
         for step in steps:
             check("building the behaviour tree")
@@ -200,21 +171,20 @@ class _TreeBuilder:
                 groups[-1].append(step)
             else:
                 groups.append([step])
-        return tuple(
-            self.node(group[0]) if len(group) == 1 else Together(tuple(map(self.node, group))) for group in groups
-        )
+        for nodes in (tuple(map(self.node, group)) for group in groups):
+            yield nodes[0] if len(nodes) == 1 else Element("Parallel", children=nodes)
 
     def needed(self, step: Step) -> list[Path]:
         """Return the paths of the primitives of a step that are required."""
         return [below.path for below in Plan((step,)).primitives if self.needs[below.path]]
 
-    def node(self, step: Step) -> TreeNode:
+    def node(self, step: Step) -> Element:
         """Return the fallback node of a step."""
         paths = self.needed(step)
-        finished = All(tuple(map(done, paths)))
-        early = All((self.kept(paths), *(mark(path, 1) for path in paths)))
+        early = sequence(self.kept(paths), *(mark(path, 1) for path in paths))
         name = f"{step} at {'.'.join(map(str, step.path))}"
-        return First((finished, early, Subtree(name, All(self.in_order(step.steps))) if step.steps else Do(step)))
+        below = Element("SubTree", name, (sequence(*self.in_order(step.steps)),))
+        return fallback(sequence(*map(done, paths)), early, below if step.steps else Element("Action", leaf=step))
 
     def independent(self, one: Step, other: Step) -> bool:
         """Return whether no primitive of one step waits for a primitive of the other, and their workers differ."""
@@ -227,18 +197,18 @@ class _TreeBuilder:
 
     # ------------------------------------------------------------------------------------------------ purposes of the steps
 
-    def kept(self, paths: Collection[Path]) -> TreeNode:
+    def kept(self, paths: Collection[Path]) -> Element:
         """Return the condition that all causal links from some primitives to other primitives and to the goal are satisfied."""
         links = [(path, need) for path in paths for need in self.needs[path] if need.by not in paths]
-        nodes = tuple(dict.fromkeys(self.link(path, need) for path, need in links))
-        return nodes[0] if len(nodes) == 1 else All(nodes)
+        nodes = list(dict.fromkeys(self.link(path, need) for path, need in links))
+        return nodes[0] if len(nodes) == 1 else sequence(*nodes)
 
-    def link(self, path: Path, need: Need) -> TreeNode:
+    def link(self, path: Path, need: Need) -> Element:
         """Return the condition that a causal link is satisfied: the later step is done, or the link's facts or conditions hold."""
         facts = self.facts(path, need)
-        return First((done(need.by), facts)) if need.by else facts
+        return fallback(done(need.by), facts) if need.by else facts
 
-    def facts(self, path: Path, need: Need) -> TreeNode:
+    def facts(self, path: Path, need: Need) -> Element:
         """Return the condition that the facts of a causal link, or the conditions of the later step, hold.
 
         If a step between the two steps changes a symbol again, the symbol may have any value except the one from before the link.
@@ -252,10 +222,10 @@ class _TreeBuilder:
                 conditions.append(ValueCondition(symbol.situation, symbol.arguments, change.before, negated=True))
             else:
                 facts.append(self.wanted(change, need.kind))
-        held = Holds(tuple(facts), tuple(conditions))
+        held = holds(facts, conditions)
         amounts = any(self.is_amount(change.fact.symbol) for change in need.gives)
         if need.conditions and not amounts and (path, need) not in self.regained:
-            return First((held, Holds(conditions=need.conditions)))
+            return fallback(held, holds((), need.conditions))
         return held
 
     def already_satisfied(self) -> Iterator[tuple[Path, Need]]:
@@ -307,17 +277,11 @@ class Situation:
         self.rules = BehaviorReader(problem)
         self.facts = LoggedState(problem, state, self.rules)
 
-    def holds(self, leaf: Holds) -> bool:
-        """Return whether all facts or conditions of a leaf hold."""
-        if leaf.conditions and self.rules.satisfied(leaf.conditions, {}, {}, self.facts) is None:
-            return False
-        return all(self.is_so(fact) for fact in leaf.facts)
-
-    def is_so(self, fact: Fact) -> bool:
-        """Return whether a fact holds; the wanted value of an amount may be a comparison."""
-        value = self.facts.value(fact.symbol.situation, fact.symbol.arguments)
-        return value is not None and meets(value, fact.value)
-
-    def can(self, step: Step) -> bool:
-        """Return whether the preconditions of a primitive hold."""
-        return followed(self.problem, [step], self.state) is not None
+    def asks(self, leaf: Leaf) -> bool:
+        """Return whether a fact or condition holds, or a primitive is applicable; the value of an amount may be a comparison."""
+        if isinstance(leaf, Step):
+            return followed(self.problem, [leaf], self.state) is not None
+        if isinstance(leaf, Fact):
+            value = self.facts.value(leaf.symbol.situation, leaf.symbol.arguments)
+            return value is not None and meets(value, leaf.value)
+        return self.rules.satisfied((leaf,), {}, {}, self.facts) is not None

@@ -16,7 +16,7 @@ import confab
 from confab.cli import app
 from confab.planner.acting.symbolic_world import SymbolicWorld
 from confab.planner.acting.world import WorldReport
-from confab.planner.behavior_tree import Situation
+from confab.planner.behavior_tree import Element, Situation
 from confab.planner.plan import Plan, Step
 from confab.planner.validation import open_goals, validate
 from confab.reasoner.amounts import Amount, Quantity
@@ -35,7 +35,7 @@ from confab.reasoner.symbols import (
     ValueCondition,
     ValueEffect,
 )
-from confab.trees import Element, Tree, behavior_tree, export_trees
+from confab.trees import Tree, behavior_tree, export_trees
 
 
 class Ticking:
@@ -69,7 +69,7 @@ class Ticking:
             case "Again":
                 return None
             case "Condition":
-                return self.tree.asks(one.key, self.situation)
+                return self.situation.asks(self.tree.leaves[one.key])
             case "Action":
                 step = self.tree.leaves[one.key]
                 assert isinstance(step, Step)
