@@ -11,9 +11,9 @@ from confab.labels import Labels
 from confab.page.data import page_labels, timeline_data
 from confab.page.results import goals_of
 from confab.page.schema import PageData, TimelineRow
-from confab.page.timeline import Bar, Period, Timeline
+from confab.page.timeline import Bar, Timeline, phases_of
 from confab.planner.acting.episode import Event
-from confab.planner.plan import Step
+from confab.planner.plan import Step, changed
 from confab.reasoner.problem import Problem
 from confab.reasoner.symbols import Symbol
 
@@ -25,7 +25,7 @@ class Following:
         self.scene, self.version = scene, 0
         self.problem = scene.problem
         self.known: dict[Symbol, str] = dict(self.problem.initial)
-        self._periods = {symbol: [(0.0, value)] for symbol, value in self.known.items()}
+        self._changes: list[tuple[float, Symbol, str]] = []
         self._bars: list[Bar] = []
         self._marks: list[tuple[float, str]] = []
         self._event: Event | None = None
@@ -63,9 +63,7 @@ class Following:
 
     def _believe(self, belief: Problem, now: float) -> None:
         """Record the changed values of symbols, and the goals."""
-        for symbol, value in belief.initial.items():
-            if self.known.get(symbol) != value:
-                self._periods.setdefault(symbol, []).append((now, value))
+        self._changes += [(now, fact.symbol, fact.value) for fact in changed(self.known, belief.initial)]
         self.known, self._wanted = dict(belief.initial), belief
 
     def data(self) -> PageData:
@@ -73,7 +71,7 @@ class Following:
         with self._lock:
             event, now = self._event, self._event.seconds if self._event is not None else 0.0
             bars, marks = list(self._bars), tuple(self._marks)
-            seen = {symbol: list(periods) for symbol, periods in self._periods.items()}
+            changes = list(self._changes)
             begun, version, wanted = self._begun, self.version, self._wanted
         assert event is not None
         begun_path = None if begun is None else begun[0].path
@@ -85,14 +83,8 @@ class Following:
             start = begun[1] if running and begun is not None else at
             at = max(now, start + length)
             bars.append(Bar(step, start, at, planned=not running))
-        phases = {
-            symbol: tuple(
-                Period(since, periods[i + 1][0] if i + 1 < len(periods) else now, value)
-                for i, (since, value) in enumerate(periods)
-            )
-            for symbol, periods in seen.items()
-        }
-        final = {symbol: periods[-1][1] for symbol, periods in seen.items()}
+        phases = phases_of(self.problem.initial, changes, now)
+        final = {symbol: periods[-1].value for symbol, periods in phases.items()}
         unit = "steps" if all(bar.end - bar.begin == 1.0 for bar in bars) else "s"
         lived = replace(self.problem, goal=wanted.goal, classes=wanted.classes)
         timeline = Timeline(lived, event.plan, tuple(bars), phases, at, unit, final, marks)

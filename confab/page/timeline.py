@@ -6,12 +6,14 @@ world's clock.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 from confab.planner.acting.schedule import worker_of
-from confab.planner.plan import Plan, Step
+from confab.planner.plan import Plan, Step, changed
 from confab.planner.timed.pieces import workers_of
 from confab.planner.validation import successor
 from confab.reasoner.problem import Problem
@@ -149,29 +151,13 @@ def of_schedule(problem: Problem, timed: TimedPlan) -> Timeline:
         Bar(slot.step, float(slot.begin), float(slot.end), actors=slot.actors, slack=float(slot.slack))
         for slot in timed.slots
     )
-    end = float(timed.makespan)
-    changes: dict[Symbol, list[tuple[float, str]]] = {
-        symbol: [(0.0, value)] for symbol, value in problem.initial.items()
-    }
-    before: State = problem.initial
-    for bar, state in zip(bars, _states(problem, [bar.step for bar in bars]), strict=True):
+
+    def at(bar: Bar, symbol: Symbol) -> float:
         timing = problem.domain.behaviors[bar.step.behavior].timing
-        at_once = {effect.situation for effect in (timing.made(Span.START) if timing is not None else ())}
-        for symbol, value in state.items():
-            if before.get(symbol) != value:
-                first = [(0.0, FALSE)] if symbol not in problem.initial else []
-                at = bar.begin if symbol.situation in at_once else bar.end
-                changes.setdefault(symbol, first).append((at, value))
-        before = state
-    for symbol in problem.goal:
-        changes.setdefault(symbol, [(0.0, FALSE)])
-    phases = {}
-    for symbol, those in changes.items():
-        ordered = sorted(those, key=lambda one: one[0])
-        ends = [*(at for at, _ in ordered[1:]), end]
-        phases[symbol] = tuple(Period(at, until, value) for (at, value), until in zip(ordered, ends, strict=True))
-    final = {symbol: periods[-1].value for symbol, periods in phases.items()}
-    return Timeline(problem, timed.plan, bars, phases, end, "s", final)
+        made = timing.made(Span.START) if timing is not None else ()
+        return bar.begin if any(effect.situation == symbol.situation for effect in made) else bar.end
+
+    return _course(problem, timed.plan, bars, _states(problem, [bar.step for bar in bars]), "s", at)
 
 
 def of_rollout(problem: Problem, plan: Plan, rollout: Rollout) -> Timeline:
@@ -208,20 +194,13 @@ def of_episode(problem: Problem, episode: Episode) -> Timeline:
         for event in episode.events
     )
     end = max((bar.end for bar in bars), default=0.0)
-    phases: dict[Symbol, list[Period]] = {s: [Period(0.0, end, v)] for s, v in episode.initial.items()}
-    for seen in episode.course:
-        before = phases.setdefault(seen.symbol, [])
-        if before:
-            before[-1] = Period(before[-1].begin, seen.seconds, before[-1].value)
-        if seen.value is not None:
-            before.append(Period(seen.seconds, max(end, seen.seconds), seen.value))
+    phases = phases_of(episode.initial, [(seen.seconds, seen.symbol, seen.value) for seen in episode.course], end)
     marks = [(at, intervention.text) for intervention, at in episode.interventions]
     ends = {event.step.path: event.end for event in episode.events}
     marks += [(ends.get(r.after, 0.0), f"{r.kind}: {r.because}") for r in episode.replans]
     lived = replace(problem, initial=episode.initial, goal=episode.goal, times=None, weights={})
-    found = {symbol: tuple(those) for symbol, those in phases.items()}
     unit = "steps" if all(bar.end - bar.begin == 1.0 for bar in bars) else "s"
-    return Timeline(lived, episode.done, bars, found, end, unit, episode.observed, tuple(sorted(marks)))
+    return Timeline(lived, episode.done, bars, phases, end, unit, episode.observed, tuple(sorted(marks)))
 
 
 def _states(problem: Problem, steps: Iterable[Step]) -> list[State]:
@@ -233,21 +212,39 @@ def _states(problem: Problem, steps: Iterable[Step]) -> list[State]:
     return found
 
 
-def _course(problem: Problem, plan: Plan, bars: Sequence[Bar], states: Sequence[State], unit: str) -> Timeline:
-    end = bars[-1].end if bars else 0.0
-    begun: dict[Symbol, tuple[float, str]] = {symbol: (0.0, value) for symbol, value in problem.initial.items()}
-    begun |= {symbol: (0.0, FALSE) for symbol in problem.goal if symbol not in begun}
-    phases: dict[Symbol, list[Period]] = {}
-    before: State = problem.initial
-    for bar, state in zip(bars, states, strict=True):
-        for symbol, value in state.items():
-            if before.get(symbol) == value or (symbol in begun and begun[symbol][1] == value):
-                continue
-            since, old = begun.get(symbol, (0.0, FALSE))
-            phases.setdefault(symbol, []).append(Period(since, bar.end, old))
-            begun[symbol] = bar.end, value
-        before = state
-    for symbol, (since, value) in begun.items():
-        phases.setdefault(symbol, []).append(Period(since, end, value))
-    final = {symbol: value for symbol, (_, value) in begun.items()}
-    return Timeline(problem, plan, tuple(bars), {s: tuple(p) for s, p in phases.items()}, end, unit, final)
+def _course(
+    problem: Problem,
+    plan: Plan,
+    bars: Sequence[Bar],
+    states: Sequence[State],
+    unit: str,
+    at: Callable[[Bar, Symbol], float] = lambda bar, symbol: bar.end,
+) -> Timeline:
+    """Return the timeline of primitives and of the states after them; `at` returns the time at which a symbol changes."""
+    initial = dict.fromkeys((*problem.goal, *(states[-1] if states else ())), FALSE) | {**problem.initial}
+    final = {**initial, **(states[-1] if states else {})}
+    changes = [
+        (at(bar, fact.symbol), fact.symbol, fact.value)
+        for bar, (before, after) in zip(bars, pairwise((initial, *states)), strict=True)
+        for fact in changed(before, after)
+    ]
+    end = max((bar.end for bar in bars), default=0.0)
+    phases = phases_of(initial, sorted(changes, key=itemgetter(0)), end)
+    return Timeline(problem, plan, tuple(bars), phases, end, unit, final)
+
+
+def phases_of(
+    initial: State, changes: Iterable[tuple[float, Symbol, str | None]], end: float
+) -> dict[Symbol, tuple[Period, ...]]:
+    """Return the values of symbols by period, from the initial values and the later changes with their times, in order of time.
+
+    A symbol whose value becomes None has no further period until it gets a value.
+    """
+    found = {symbol: [Period(0.0, end, value)] for symbol, value in initial.items()}
+    for at, symbol, value in changes:
+        periods = found.setdefault(symbol, [])
+        if periods:
+            periods[-1] = replace(periods[-1], end=at)
+        if value is not None:
+            periods.append(Period(at, max(end, at), value))
+    return {symbol: tuple(periods) for symbol, periods in found.items()}
