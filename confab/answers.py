@@ -103,8 +103,7 @@ def query(folder: Path, name: str, sparql: str, seconds: float) -> str:
     table = scene_of(folder, name).query(sparql, QueryLimits(seconds=seconds, rows=ROWS))
     if table.truth is not None:
         return str(table.truth).lower()
-    lines = ["\t".join(table.columns), *("\t".join(cell or "" for cell in row) for row in table)]
-    return "\n".join([*lines, f"({len(table)} rows)"])
+    return f"{table.tsv()}({len(table)} rows)"
 
 
 def validate(folder: Path, name: str) -> str:
@@ -145,7 +144,4 @@ def verify(folder: Path, name: str, goals: Sequence[str], rollouts: int, seed: i
         if not result.solved:
             return str(result)
         report = result.verify(rollouts, seed, time_limit=seconds)
-    steps = ("\t".join(cell or "" for cell in row) for row in report.table())
-    return "\n".join(
-        [report.summary(), "\t".join(report.table().columns), *steps, json.dumps(report.json()["success"])]
-    )
+    return f"{report.summary()}\n{report.table().tsv()}{json.dumps(report.json()['success'])}"

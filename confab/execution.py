@@ -27,10 +27,11 @@ from confab.interchange import episode_json
 from confab.intervening import parse_interventions
 from confab.planner.acting.dispatching import Concurrency
 from confab.planner.acting.episode import End, Episode, Event, Intervention, InterventionKind, situation
+from confab.planner.acting.executed import observed_before, with_newcomers
 from confab.planner.acting.executive import act
 from confab.planner.acting.failure_memory import Caution
 from confab.planner.acting.retries import RetryPolicy
-from confab.planner.acting.symbolic_world import SymbolicWorld, with_individual
+from confab.planner.acting.symbolic_world import SymbolicWorld
 from confab.planner.acting.world import World
 from confab.planner.finding import numbers
 from confab.planner.plan import Plan, Planner, SoftGoal
@@ -85,10 +86,8 @@ class Execution(metaclass=RightNames):
     @property
     def violations(self) -> tuple[str, ...]:
         """The violations of constraints that were observed, each with its time; steps cause none, but interventions may."""
-        problem, episode = self.scene.problem, self.episode
-        for one, _ in episode.interventions:
-            if one.change is InterventionKind.ADD:
-                problem = with_individual(problem, one.individual, one.kind)
+        episode = self.episode
+        problem = with_newcomers(self.scene.problem, episode)
         texts, before = list[str](), set[Symbol]()
         for seconds in sorted({change.seconds for change in episode.course}) if problem.domain.constraints else ():
             state = situation(episode.initial, episode.course, seconds)
@@ -136,17 +135,14 @@ class Execution(metaclass=RightNames):
 
     def summary(self) -> str:
         """Return a summary of the episode in one line."""
+        from confab.memory import counted
+
         episode = self.episode
         primitives = len(episode.done.primitives)
         text = f"{episode.status.value}: {primitives} primitives done"
-        for count, word in (
-            (len(episode.interventions), "intervention"),
-            (len(episode.replans), "change of plan"),
-            (len(episode.failures), "failure"),
-        ):
-            text += (
-                f", {count} {word if count == 1 else word.replace('change', 'changes') + 's' * ('change' not in word)}"
-            )
+        text += f", {counted(len(episode.interventions), 'intervention')}"
+        text += f", {counted(len(episode.replans), 'change of plan', 'changes of plan')}"
+        text += f", {counted(len(episode.failures), 'failure')}"
         if has_times(self.scene.problem):
             text += f", in {episode.seconds['simulated']:g} s"
         for met, what in ((True, "soft goal reached"), (False, "soft goal left unmet")):
@@ -169,7 +165,6 @@ class Execution(metaclass=RightNames):
 
     def graph(self) -> networkx.DiGraph[int]:
         """Return the partial order of the executed primitives. An edge leads from a primitive to a primitive that depends on it."""
-        from confab.planner.acting.executed import observed_before, with_newcomers
         from confab.planner.acting.schedule import partial_order
 
         episode = self.episode

@@ -10,6 +10,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
+from confab.interchange import read_json
 from confab.reasoner.files import made_folder, write_whole
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.names import local_name, nearest, right_arguments
@@ -92,10 +93,7 @@ def runs(folder: str | Path) -> list[Run]:
 
 
 def _read(file: Path) -> Run:
-    try:
-        data = json.loads(file.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:
-        raise KnowledgeError(f"{file}: not JSON: {error}") from error
+    data = read_json(file, "record of a run")
     match data:
         case {"when": str(when), "how": dict(how), "memory": str(memory), "page": dict(page)} if _is_page(page):
             return Run(file.parent.resolve().name, when, how, memory, cast("PageData", page))

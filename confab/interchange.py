@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -23,9 +23,9 @@ DEEPEST = 50
 """Maximum depth of nested steps in a plan."""
 
 
-def step_json(step: Step) -> StepJson:
-    """Return a step with its sub-steps as JSON data."""
-    return cast("StepJson", step.json())
+def steps_json(steps: Iterable[Step]) -> list[StepJson]:
+    """Return steps with their sub-steps as JSON data."""
+    return [cast("StepJson", step.json()) for step in steps]
 
 
 def outcome_json(scene: str, outcome: Outcome, seconds: Mapping[str, float]) -> OutcomeJson:
@@ -53,7 +53,7 @@ def outcome_json(scene: str, outcome: Outcome, seconds: Mapping[str, float]) -> 
     }
     if outcome.plan is not None:
         data["length"] = {str(level): count for level, count in outcome.plan.length.items()}
-        data["steps"] = [step_json(step) for step in outcome.plan.steps]
+        data["steps"] = steps_json(outcome.plan.steps)
     if outcome.cost is not None:
         data["cost"] = outcome.cost
     if outcome.plan is not None and outcome.penalty is not None:
@@ -85,8 +85,8 @@ def episode_json(episode: Episode) -> EpisodeJson:
         "status": episode.status.value,
         "reasons": [{"text": reason.text, "terms": list(reason.terms)} for reason in episode.reasons],
         "length": {str(level): count for level, count in episode.done.length.items()},
-        "planned": [step_json(step) for step in episode.planned.steps],
-        "steps": [step_json(step) for step in episode.done.steps],
+        "planned": steps_json(episode.planned.steps),
+        "steps": steps_json(episode.done.steps),
         "events": [
             {
                 "path": list(event.step.path),
@@ -114,7 +114,7 @@ def episode_json(episode: Episode) -> EpisodeJson:
                 "dropped": replan.dropped,
                 "added": replan.added,
                 "seconds": round(replan.seconds, 6),
-                "steps": [step_json(step) for step in replan.steps],
+                "steps": steps_json(replan.steps),
             }
             for replan in episode.replans
         ],
@@ -158,7 +158,7 @@ def read_plan(path: Path, problem: Problem) -> Plan:
     KnowledgeError
         The file isn't the JSON of a plan, or a step mentions terms that the scene doesn't have. The message states the position.
     """
-    data = _json(path, "plan")
+    data = read_json(path, "plan")
     status = data.get("status", Status.SOLVED.value) if isinstance(data, dict) else None
     if status is None or not isinstance(data.get("steps"), list):
         what = f"its status is '{status}'" if status not in (None, "solved", "reached") else "it has no 'steps'"
@@ -176,15 +176,15 @@ def read_certificate(path: Path) -> Certificate:
     KnowledgeError
         The file isn't the JSON of a certificate. The message states the expected form.
     """
-    data = _json(path, "certificate")
+    data = read_json(path, "certificate")
     try:
         return certificate_from(data.get("certificate", data) if isinstance(data, dict) else data)
     except ValueError as error:
         raise KnowledgeError(f"{path}: {error}") from error
 
 
-def _json(path: Path, what: str) -> Any:
-    """Return the content of a JSON file. In error messages, `what` names the expected content: a plan or a certificate."""
+def read_json(path: Path, what: str) -> Any:
+    """Return the content of a JSON file. In error messages, `what` names the expected content, such as a plan."""
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:

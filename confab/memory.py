@@ -434,10 +434,13 @@ class Memory(metaclass=RightNames):
         lived = counted(sum(self.experience.episodes.values()), "episode")
         links = f"{counted(len(self.links), 'link')} of {counted(len(self.links.tables), 'behaviour')}"
         kinds = [
-            counted(sum(isinstance(one, kind) for one in self.experience.said.values()), noun)
-            for kind, noun in ((LearnedRule, "rule"), (LearnedOrder, "order of goals"), (Method, "method"))
+            counted(sum(isinstance(one, kind) for one in self.experience.said.values()), *nouns)
+            for kind, *nouns in (
+                (LearnedRule, "rule"),
+                (LearnedOrder, "order of goals", "orders of goals"),
+                (Method, "method"),
+            )
         ]
-        kinds[1] = kinds[1].replace("order of goalss", "orders of goals")
         return f"{lived} so far: {', '.join(kinds)}; of the paper's memory {links}."
 
     def __rich__(self) -> Group:
@@ -472,15 +475,15 @@ def preferred(say: Sayings, facts: Mapping[RoleFact, tuple[float, float]]) -> li
     return [f"{'lately' if lead > 0 else 'not lately'} {text}" for by, text, lead in clear[:SHOWN] if by >= 0.5]
 
 
-def counted(number: int, noun: str) -> str:
-    """Return a number and a noun, in the singular or the plural.
+def counted(number: int, noun: str, many: str = "") -> str:
+    """Return a number and a noun, in the singular or the plural `many`, which by default has the ending -s.
 
     Examples
     --------
     >>> counted(1, "episode"), counted(2, "replica")
     ('1 episode', '2 replicas')
     """
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+    return f"{number} {noun if number == 1 else many or f'{noun}s'}"
 
 
 def endpoint(source: str | Path) -> str | None:

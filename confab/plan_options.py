@@ -10,7 +10,7 @@ from confab.accepting import check_seconds
 from confab.planner.solve import DEFAULT_MODE, MODES, Mode
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import Deadline
-from confab.timing import Minimise, checked_minimise
+from confab.timing import MINIMISE, Minimise
 
 if TYPE_CHECKING:
     from confab.memory import Memory
@@ -58,7 +58,8 @@ class PlanOptions:
 
     def __post_init__(self) -> None:
         """Raise `KnowledgeError` if an option is invalid or options exclude each other."""
-        checked_minimise(self.minimise)
+        if self.minimise not in (None, *MINIMISE):
+            raise KnowledgeError(f"minimise='{self.minimise}'; wanted one of {', '.join(MINIMISE)}")
         if self.level is not None and not self.by_engine:
             raise KnowledgeError(
                 "a level is chosen for an engine; name one, e.g. engine='fast-downward' "
@@ -102,10 +103,3 @@ class PlanOptions:
     def limit(self) -> float | Deadline | None:
         """The time limit of the call. Only the optimal search has a default limit, which is `OPTIMAL_SECONDS`."""
         return OPTIMAL_SECONDS if self.time_limit is None and self.strategy == "optimal" else self.time_limit
-
-
-def leaves_levels(levels: str) -> bool:
-    """Return whether the value of ``--levels`` permits plans that have no steps of some levels."""
-    if levels not in ("free", "strict"):
-        raise KnowledgeError(f"--levels is '{levels}'; wanted free or strict")
-    return levels == "free"

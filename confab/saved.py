@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from confab.interchange import step_from
+from confab.interchange import read_json, step_from
 from confab.intervening import parse_intervention
 from confab.known import Known
 from confab.planner.acting.discovery import Discovery
@@ -157,16 +156,9 @@ def read_report(scene: Known, verdicts: Path, plan: Plan) -> Report:
 @contextmanager
 def _read(path: Path, wanted: str) -> Iterator[Data]:
     """Yield the JSON data in a file; an error of the ``with`` block about missing data becomes a `KnowledgeError`."""
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise KnowledgeError(f"{path}: can't be read: {error.strerror}") from error
-    except (ValueError, RecursionError) as error:
-        if path.suffix == ".ttl":
-            raise KnowledgeError(
-                f"{path}: is Turtle, which with_episodes reads; wanted JSON: save it as FILE.json"
-            ) from error
-        raise KnowledgeError(f"{path}: not JSON: {error}") from error
+    if path.suffix == ".ttl" and path.is_file():
+        raise KnowledgeError(f"{path}: is Turtle, which with_episodes reads; wanted JSON: save it as FILE.json")
+    data = read_json(path, wanted.partition(";")[0])
     try:
         yield data
     except KnowledgeError:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import html
 import io
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -197,15 +196,10 @@ class Table(Sequence[tuple[str | None, ...]]):
         return table
 
     def _repr_html_(self) -> str:
-        if self.empty and not self.rows:
-            return f"<p>{html.escape(self.empty)}</p>"
-        left = "style='text-align: left'"
-        head = "".join(f"<th {left}>{html.escape(name)}</th>" for name in self.columns)
-        body = "".join(
-            "<tr>" + "".join(f"<td {left}>{html.escape(cell or '')}</td>" for cell in row) + "</tr>"
-            for row in self.rows
-        )
-        return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+        from confab.page.markup import styled, tag
+        from confab.page.pieces import table
+
+        return styled(tag("p", self.empty) if self.empty and not self.rows else table(self.columns, self.rows))
 
     def __repr__(self) -> str:
         """Return the table as text."""

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 from confab.formats import ScheduledStepJson, ScheduleJson
 from confab.planner.plan import Outcome, Status
 from confab.planner.timed.plan import schedule_of
-from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import Deadline
 from confab.reasoner.problem import Problem
 from confab.reasoner.timing import judged_by_events, only_during
@@ -25,13 +24,6 @@ WIDTH = 72
 """Length of a lane in characters; a lane represents the whole makespan."""
 MOST_CRITICAL = 12
 """Maximum number of listed steps of the critical path."""
-
-
-def checked_minimise(minimise: str | None) -> str | None:
-    """Return the quantity to be minimised; raise `KnowledgeError` if the quantity is unknown."""
-    if minimise is not None and minimise not in MINIMISE:
-        raise KnowledgeError(f"minimise='{minimise}'; wanted one of {', '.join(MINIMISE)}")
-    return minimise
 
 
 def with_unit_costs(problem: Problem) -> Problem:

@@ -13,14 +13,14 @@ PAUSE = 0.3
 """Seconds between two checks of the files."""
 
 
-def again_and_again(files: Sequence[str | Path], pause: float = PAUSE) -> Iterator[None]:
+def again_and_again(files: Sequence[str | Path]) -> Iterator[None]:
     """Yield None whenever ontology files or their imports have changed; the iterator never ends."""
     watched = _with_imports(files)
     seen = _stamps(watched)
     while True:
-        sleep(pause)
+        sleep(PAUSE)
         if _stamps(watched) != seen:
-            sleep(pause)  # an editor may write a file in several steps
+            sleep(PAUSE)  # an editor may write a file in several steps
             watched = _with_imports(files)
             seen = _stamps(watched)
             yield

@@ -123,9 +123,9 @@ class WhyNot:
 
     def json(self) -> WhyNotJson:
         """Return the answer as JSON data."""
-        from confab.interchange import step_json
+        from confab.interchange import steps_json
 
-        steps = None if self.plan is None else [step_json(step) for step in self.plan.steps]
+        steps = None if self.plan is None else steps_json(self.plan.steps)
         return {
             "asked": self.asked,
             "answer": self.answer,

@@ -69,7 +69,11 @@ if TYPE_CHECKING:
     "--optimal", is_flag=True, help="As --mode optimal: improve the plan until it is proved optimal, for up to 10 s."
 )
 @click.option(
-    "--levels", default="free", metavar="free|strict", help="strict: fail if a level has no plan that can be refined."
+    "--levels",
+    type=click.Choice(["free", "strict"]),
+    default="free",
+    metavar="free|strict",
+    help="strict: fail if a level has no plan that can be refined.",
 )
 @click.option(
     "--from-observed",
@@ -115,12 +119,12 @@ def plan(
     as_json: bool,
 ) -> None:
     """Plan in a scene, and print the plan as a tree of steps."""
-    from confab.plan_options import PlanOptions, leaves_levels
+    from confab.plan_options import PlanOptions
     from confab.planning import plan_by
     from confab.show import summary
     from confab.timing import lanes
 
-    free = leaves_levels(levels)
+    free = levels == "free"
     others = {
         "--memory": memory,
         "--optimal": optimal or None,
