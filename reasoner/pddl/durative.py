@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from fractions import Fraction
 
-from confab.reasoner.pddl.words import Form, PddlWord
+from confab.reasoner.pddl.words import Form, PddlWord, is_number
 
 SPANS = {("at", "start"): "start", ("over", "all"): "all", ("at", "end"): "end"}
 DURATION = "?duration"
@@ -38,10 +39,15 @@ def duration_in(form: Form) -> PddlWord | Form:
             or not (isinstance(one.items[1], PddlWord) and one.items[1].text == DURATION)
         ):
             raise NotTimedError(one, "wanted (= ?duration …), or bounds by (>= ?duration …) and (<= ?duration …)")
-        found.setdefault(one.head, one.items[2])
+        if found and (one.head in found or "=" in (*found, one.head)):
+            raise NotTimedError(one, "wanted (= ?duration …) alone, or one lower and one upper bound of ?duration")
+        found[one.head] = one.items[2]
     chosen = found.get("=") or found.get(">=") or found.get("<=")
     if chosen is None:
         raise NotTimedError(form, "wanted (= ?duration …)")
+    numbers = {sign: Fraction(one.text) for sign, one in found.items() if isinstance(one, PddlWord) and is_number(one)}
+    if ">=" in numbers and numbers[">="] > numbers.get("<=", numbers[">="]):
+        raise NotTimedError(form, "the lower bound of ?duration is above its upper bound")
     return chosen
 
 

@@ -222,6 +222,21 @@ def test_a_condition_or_effect_with_a_missing_or_wrong_time_is_refused_with_its_
 
 
 @pytest.mark.parametrize(
+    "duration",
+    [
+        "(and (>= ?duration 2) (>= ?duration 5))",
+        "(and (= ?duration 5) (<= ?duration 3))",
+        "(and (<= ?duration 5) (= ?duration 3))",
+        "(and (>= ?duration 5) (<= ?duration 3))",
+    ],
+)
+def test_bounds_of_a_duration_that_an_import_would_ignore_are_refused_with_their_place(duration: str) -> None:
+    domain = CELLAR.replace("(= ?duration 5)", duration)
+    with pytest.raises(PddlError, match=r"domain:3:\d+: .*bound"):
+        parse(domain, FUSES)
+
+
+@pytest.mark.parametrize(
     ("action", "init", "goal", "steps"),
     [
         ("(at start (not (p))) :effect (and (at start (p)) (when (at end (p)) (at end (q))))", "", "(q)", ["A"]),
