@@ -11,7 +11,10 @@ from collections import defaultdict, deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from math import lcm
+
+import networkx
 
 from confab.planner.timed.order import BEGIN, END, Edge, Order
 
@@ -52,6 +55,11 @@ class Network:
     at: list[int | None]
     latest: list[tuple[tuple[int, int], ...]]
     windows: list[tuple[Window, ...]]
+
+    @cached_property
+    def limited(self) -> bool:
+        """Whether some activity has a latest time, time windows or a fixed time."""
+        return any(self.latest) or any(its is not ALWAYS for its in self.windows) or self.at != [None] * len(self.at)
 
     def least(self, i: int, high: int, j: int, low: int) -> int:
         """Return the minimum time from the begin or end of activity `i` to the begin or end of activity `j`."""
@@ -174,51 +182,54 @@ def earliest(
         The least durations; the begins satisfy the edges with all durations from `shortest` to `durations`.
     """
     lasts = network.durations if durations is None else durations
-    arcs = network.arcs((*network.edges, *edges), lasts, shortest)
+    return begins_after(network, lasts, network.arcs((*network.edges, *edges), lasts, shortest))
+
+
+def begins_after(network: Network, lasts: Sequence[int], arcs: Sequence[Sequence[tuple[int, int]]]) -> Begins | None:
+    """Return the earliest begins that satisfy arcs, or None if the arcs form a cycle; `lasts` are the durations."""
     count = len(lasts)
     begins, waits = [0] * count, [-1] * count
-    for i in range(count):
+    for i in range(count) if network.limited else ():
         begins[i] = _fitting(network.windows[i], network.at[i] or 0, lasts[i])
     before = [0] * count
     for after in arcs:
         for j, _ in after:
             before[j] += 1
     ready = [i for i in range(count) if not before[i]]
+    limited = network.limited
     for i in ready:  # the loop appends activities to the list
         for j, apart in arcs[i]:
             before[j] -= 1
             if not before[j]:
                 ready.append(j)
-            _move(network, lasts, begins, waits, i, j, apart)
+            if limited:
+                _move(network, lasts, begins, waits, i, j, apart)
+            elif begins[i] + apart > begins[j]:
+                begins[j], waits[j] = begins[i] + apart, i
     if len(ready) < count and (
-        _only_forward(arcs, set(range(count)).difference(ready)) or not _settled(network, lasts, arcs, begins, waits)
+        _excluded(arcs, set(range(count)).difference(ready)) or not _settled(network, lasts, arcs, begins, waits)
     ):
         return None
     makespan = max((b + d for b, d, at in zip(begins, lasts, network.at, strict=True) if at is None), default=0)
+    if not network.limited:
+        return Begins(begins, waits, makespan)
     late = [_lateness(network, i, begins[i], lasts[i]) for i in range(count)]
     worst = max(range(count), key=late.__getitem__, default=-1)
     return Begins(begins, waits, makespan, sum(late), worst if worst >= 0 and late[worst] else -1)
 
 
-def _only_forward(arcs: Sequence[Sequence[tuple[int, int]]], cyclic: set[int]) -> bool:
-    """Return whether every arc within a cycle requires a later begin; if so, no begins satisfy the cycle.
+def _excluded(arcs: Sequence[Sequence[tuple[int, int]]], cyclic: set[int]) -> bool:
+    """Return whether some cycle has arcs that require a later begin and none that allows an earlier one; no begins satisfy it.
 
     `cyclic` contains the activities of cycles and all activities after them.
     """
-    before: dict[int, list[int]] = {i: [] for i in cyclic}
-    left = dict.fromkeys(cyclic, 0)
-    for i in cyclic:
-        for j, _ in arcs[i]:
-            before[j].append(i)
-            left[i] += 1
-    done = [i for i in cyclic if not left[i]]
-    for j in done:  # the loop appends activities to the list
-        for i in before[j]:
-            left[i] -= 1
-            if not left[i]:
-                done.append(i)
-    inside = cyclic.difference(done)
-    return all(apart > 0 for i in inside for j, apart in arcs[i] if j in inside)
+    graph: networkx.DiGraph[int] = networkx.DiGraph()
+    graph.add_edges_from((i, j) for i in cyclic for j, _ in arcs[i])
+    for inside in networkx.strongly_connected_components(graph):
+        apart = [least for i in inside for j, least in arcs[i] if j in inside]
+        if apart and min(apart) >= 0 < max(apart):
+            return True
+    return False
 
 
 def _lateness(network: Network, i: int, begin: int, lasts: int) -> int:

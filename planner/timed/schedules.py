@@ -1,21 +1,26 @@
 """Schedules of activities: the order of the turns of each resource, the actor of each turn, and the begins of activities.
 
 The first schedule has the order of the sequence or is made by list scheduling (`confab.planner.timed.listing`). Then a tabu
-search exchanges turns on the critical path (Nowicki and Smutnicki, "A fast taboo search algorithm for the job shop problem",
-Management Science 42, 1996). If OR-Tools is installed, CP-SAT improves the result (`confab.planner.timed.cpsat`).
+search exchanges turns on the critical path, together with all turns that must move then (Nowicki and Smutnicki, "A fast taboo
+search algorithm for the job shop problem", Management Science 42, 1996). If OR-Tools is installed, CP-SAT improves the result
+(`confab.planner.timed.cpsat`).
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Container, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import chain, islice, pairwise
 from math import inf
 from time import perf_counter
 
+import networkx
+
 from confab.planner.timed.listing import Listing
-from confab.planner.timed.network import Begins, Network, earliest
+from confab.planner.timed.network import Begins, Network, begins_after, earliest
 from confab.planner.timed.order import BEGIN, END, Edge, Order, Resource, Turn, TurnId
 
 Exchange = tuple[TurnId, TurnId | int]
@@ -125,27 +130,32 @@ def turn_edges(order: Order, turns: Sequence[Sequence[TurnId]], apart: bool = Fa
 
     Events of a pool are ordered if one of them takes what another one gives, or all of them if `apart` is true.
     """
-    for one, line in zip(order.resources, turns, strict=True):
-        if one.pool is not None:
-            numbers = [number for _, number in line]
-            for before, after in (*one.pool.pairs(numbers), *(pairwise(numbers) if apart else ())):
-                (high,), (low,) = one.turns[before].highs, one.turns[after].lows
-                if before == after:
-                    yield high[0], END, low[0], BEGIN  # no event takes what it gives itself
-                elif high[0] != low[0] or high[1] == END:
-                    yield (*high, *low)
-            continue
-        last: Turn | None = None
-        readers: list[Turn] = []
-        for resource, number in line:
-            turn = order.resources[resource].turns[number]
-            before = [*((last,) if last else ()), *(() if turn.reading else readers)]
-            for other in before:
-                yield from ((i, high, j, low) for i, high in other.highs for j, low in turn.lows if i != j)
-            if turn.reading:
-                readers.append(turn)
-            else:
-                last, readers = turn, []
+    for resource, line in enumerate(turns):
+        yield from _line_edges(order, resource, line, apart)
+
+
+def _line_edges(order: Order, resource: int, line: Sequence[TurnId], apart: bool) -> Iterator[Edge]:
+    """Yield the edges that order the turns of one resource."""
+    one = order.resources[resource]
+    if one.pool is not None:
+        numbers = [number for _, number in line]
+        for before, after in (*one.pool.pairs(numbers), *(pairwise(numbers) if apart else ())):
+            (high,), (low,) = one.turns[before].highs, one.turns[after].lows
+            if before == after:
+                yield high[0], END, low[0], BEGIN  # no event takes what it gives itself
+            elif high[0] != low[0] or high[1] == END:
+                yield (*high, *low)
+        return
+    last: Turn | None = None
+    readers: list[Turn] = []
+    for own, number in line:
+        turn = order.resources[own].turns[number]
+        for other in (*((last,) if last else ()), *(() if turn.reading else readers)):
+            yield from ((i, high, j, low) for i, high in other.highs for j, low in turn.lows if i != j)
+        if turn.reading:
+            readers.append(turn)
+        else:
+            last, readers = turn, []
 
 
 def durations_with(network: Network, choices: ActorChoices, turns: Sequence[Sequence[TurnId]]) -> list[int]:
@@ -171,6 +181,29 @@ class _ScheduleSearch:
     ) -> None:
         self.order, self.network, self.choices, self.fixed, self.work = order, network, choices, fixed, work
         self.slow = slow
+        self.listing = Listing(order, network, choices.of, choices.lasts)
+        self.arcs_of: dict[tuple[int, tuple[TurnId, ...]], list[tuple[int, int, int]]] = {}
+
+    @cached_property
+    def arcs(self) -> list[list[tuple[int, int]]]:
+        """The arcs of the network with the durations of the plan's actors."""
+        return self.network.arcs(self.network.edges, self.network.durations)
+
+    @cached_property
+    def blocks(self) -> list[list[int]]:
+        """The activities of each block (`confab.planner.timed.listing`)."""
+        return self.listing.blocks()
+
+    @cached_property
+    def block_of(self) -> list[int]:
+        """The block of each activity."""
+        of = {i: number for number, block in enumerate(self.blocks) for i in block}
+        return [of[i] for i in range(len(of))]
+
+    @cached_property
+    def before(self) -> networkx.DiGraph[int]:
+        """The graph of the blocks that must precede others in every schedule."""
+        return self.listing.graph(self.blocks)
 
     def evaluated(self, turns: list[list[TurnId]]) -> CandidateSchedule | None:
         """Return the schedule for an order of turns, or None if the order has no schedule."""
@@ -180,13 +213,28 @@ class _ScheduleSearch:
 
     def begins(self, turns: list[list[TurnId]], network: Network, choices: ActorChoices) -> Begins | None:
         """Return the earliest begins for an order of turns, or None if the order has no schedule."""
-        edges = turn_edges(self.order, turns, network.separation > 0)
-        return earliest(network, edges, durations_with(network, choices, turns))
+        durations = durations_with(network, choices, turns)
+        if network is not self.network or durations != network.durations:
+            return earliest(network, turn_edges(self.order, turns, network.separation > 0), durations)
+        arcs = list(self.arcs)
+        for resource, line in enumerate(turns):
+            for i, j, apart in self.line_arcs(resource, tuple(line)):
+                arcs[i] = [*arcs[i], (j, apart)]
+        return begins_after(network, durations, arcs)
+
+    def line_arcs(self, resource: int, line: tuple[TurnId, ...]) -> list[tuple[int, int, int]]:
+        """Return the arcs that order the turns of one resource, with the durations of the plan's actors."""
+        found = self.arcs_of.get((resource, line))
+        if found is None:
+            edges = _line_edges(self.order, resource, line, self.network.separation > 0)
+            its = enumerate(self.network.arcs(edges, self.network.durations))
+            found = self.arcs_of[resource, line] = [(i, j, apart) for i, after in its for j, apart in after]
+        return found
 
     def starts(self) -> Iterator[list[list[TurnId]]]:
         """Yield the orders of turns that lead to the first schedules: the order of the sequence, and list scheduling."""
         yield self.order.turns
-        listed = Listing(self.order, self.network, self.choices.of, self.choices.lasts).turns()
+        listed = self.listing.turns()
         if listed is not None:
             yield listed
 
@@ -210,9 +258,11 @@ class _ScheduleSearch:
                 if other is None or (tabu.get(exchange, 0) > step and other.cost >= best.cost):
                     continue
                 options.append((other.cost, len(options), undoing, other))
-            if not options:
+            options.sort(key=lambda option: option[:2])
+            chosen = next((option for option in options if self.sequential(option[-1])), None)
+            if chosen is None:
                 break
-            _, _, undoing, now = min(options)
+            *_, undoing, now = chosen
             tabu[undoing] = step + TABU
             if now.cost < best.cost:
                 best, barren = now, 0
@@ -221,19 +271,22 @@ class _ScheduleSearch:
     def neighbours(self, now: CandidateSchedule) -> Iterator[tuple[Exchange, Exchange, list[list[TurnId]]]]:
         """Yield the exchanges on the critical path, each with the exchange that undoes it and the orders of turns after it.
 
-        An exchange swaps two neighbouring turns, or moves a turn to another actor.
+        An exchange swaps two neighbouring turns, alone or with the blocks that must move with one of them, or moves a turn to
+        another actor.
         """
-        critical = set(self.critical(now))
+        tried = list[list[list[TurnId]]]()
+        critical, positions = set(self.critical(now)), None if self.fixed else self.positions(now)
         for resource, line in enumerate(now.turns):
             for i, (one, other) in enumerate(pairwise(line)):
                 if one in self.fixed or other in self.fixed:
                     continue
-                if self.meets(one, critical) and self.meets(other, critical):
-                    yield (
-                        (one, other),
-                        (other, one),
-                        self.replaced(now, {resource: [*line[:i], other, one, *line[i + 2 :]]}),
-                    )
+                if self.meets(one, critical) and self.meets(other, critical) and not self.precedes(one, other):
+                    changes = [] if positions is None else list(self.shifted(now, positions, one, other))
+                    for lines in (*changes, {resource: [*line[:i], other, one, *line[i + 2 :]]}):
+                        new = self.replaced(now, lines)
+                        if new not in tried:
+                            tried.append(new)
+                            yield (one, other), (other, one), new
             for turn in line:
                 able = () if turn in self.fixed else self.choices.of.get(turn, ())
                 if able and self.meets(turn, critical):
@@ -241,6 +294,117 @@ class _ScheduleSearch:
                         if target != resource:
                             for turns in self.moved(now, turn, resource, target):
                                 yield (turn, target), (turn, resource), turns
+
+    def precedes(self, one: TurnId, other: TurnId) -> bool:
+        """Return whether the network alone requires that a turn precedes another one."""
+        then = sum(1 << i for i in set(self.members(other)))
+        return any(self.following[i] & then for i in self.members(one))
+
+    @cached_property
+    def following(self) -> list[int]:
+        """The activities that must follow each activity, as bits; those that must follow through an earlier one may be left out."""
+        found = [0] * len(self.arcs)
+        for i in reversed(range(len(found))):
+            for j, _ in self.arcs[i]:
+                found[i] |= 1 << j | found[j]
+        return found
+
+    @cached_property
+    def after(self) -> list[set[int]]:
+        """The blocks that must follow each block."""
+        return [networkx.descendants(self.before, block) for block in range(len(self.blocks))]
+
+    @cached_property
+    def earlier(self) -> list[set[int]]:
+        """The blocks that must precede each block."""
+        return [networkx.ancestors(self.before, block) for block in range(len(self.blocks))]
+
+    def blocks_of(self, turn: TurnId) -> set[int]:
+        """Return the blocks with activities of a turn."""
+        return {self.block_of[i] for i in self.members(turn)}
+
+    def members(self, turn: TurnId) -> tuple[int, ...]:
+        """Return the activities of a turn."""
+        return self.order.resources[turn[0]].turns[turn[1]].members
+
+    def sequential(self, now: CandidateSchedule) -> bool:
+        """Return whether the actors of the plan keep their turns, or the steps of the first level have a sequential order."""
+        if all(turn[0] == resource for resource, line in enumerate(now.turns) for turn in line):
+            return True
+        of = [one.step.path[0] for one in self.order.activities]
+        edges = (*self.network.edges, *turn_edges(self.order, now.turns))
+        graph = networkx.DiGraph((of[i], of[j]) for i, _, j, _ in edges if of[i] != of[j])
+        return networkx.is_directed_acyclic_graph(graph)
+
+    def positions(self, now: CandidateSchedule) -> dict[int, int] | None:
+        """Return the position of each block in a sequential order of the blocks, or None if they have no sequential order."""
+        begins, graph, of = now.begins.begins, self.before.copy(), self.block_of
+        graph.add_edges_from((of[i], of[j]) for i, _, j, _ in turn_edges(self.order, now.turns) if of[i] != of[j])
+        first = [min(begins[i] for i in block) for block in self.blocks]
+        with suppress(networkx.NetworkXUnfeasible):
+            order = networkx.lexicographical_topological_sort(graph, first.__getitem__)
+            return {block: place for place, block in enumerate(order)}
+        return None
+
+    def shifted(
+        self, now: CandidateSchedule, positions: Mapping[int, int], one: TurnId, other: TurnId
+    ) -> Iterator[dict[int, list[TurnId]]]:
+        """Yield the changed orders if a turn moves before an earlier one, or the earlier one behind it, with all that must move."""
+        for sign, bar, moving in ((1, one, other), (-1, other, one)):
+            places = {block: sign * place for block, place in positions.items()}
+            found = self.carried(now, places, bar, moving, self.earlier if sign > 0 else self.after)
+            if found is None:
+                continue
+            (low, carried), lines = found, dict[int, list[TurnId]]()
+            for resource, line in enumerate(now.turns):
+                first = [min(self.blocks_of(turn), key=places.__getitem__) for turn in line]
+                group = [0 if places[block] < low else sign if block in carried else 2 * sign for block in first]
+                order = sorted(range(len(line)), key=group.__getitem__)
+                if order != list(range(len(line))):
+                    lines[resource] = [line[n] for n in order]
+            if lines:
+                yield lines
+
+    def carried(
+        self,
+        now: CandidateSchedule,
+        places: Mapping[int, int],
+        bar: TurnId,
+        moving: TurnId,
+        earlier: Sequence[Container[int]],
+    ) -> tuple[int, set[int]] | None:
+        """Return the place to which a turn moves so that it precedes another one, and the blocks that move with it.
+
+        These are the blocks that must precede its blocks, and the blocks of turns that would overlap with other turns otherwise.
+        Return None if the other turn must precede some of these blocks.
+        """
+        kept, found, new = self.blocks_of(bar), set[int](), self.blocks_of(moving)
+        low = min(map(places.__getitem__, kept))
+        every = [[sorted(self.blocks_of(turn), key=places.__getitem__) for turn in line] for line in now.turns]
+        several = [its for its in every if any(len(blocks) > 1 for blocks in its)]
+        while new:
+            found |= new
+            if not found.isdisjoint(kept):
+                return None
+            new = {
+                b
+                for b, at in places.items()
+                if at >= low and b not in found and any(b in earlier[one] for one in found)
+            }
+            for its in () if new else several:
+                early = [blocks for blocks in its if blocks[0] in found]
+                if not early:
+                    continue
+                least = min((p for b in its if (p := places[b[0]]) >= low and b[0] not in found), default=inf)
+                new.update(b for blocks in early if places[blocks[0]] > least for b in blocks if b not in found)
+                for blocks in its:
+                    if places[blocks[0]] < low <= places[blocks[-1]] and not found.issuperset(blocks):
+                        if kept.isdisjoint(blocks):
+                            new.update(b for b in blocks if places[b] >= low and b not in found)
+                        else:  # the turn moves before the whole turn that holds the other one
+                            kept, low = kept.union(blocks), places[blocks[0]]
+                            new = new or set(found)
+        return low, found
 
     def moved(self, now: CandidateSchedule, turn: TurnId, resource: int, target: int) -> Iterator[list[list[TurnId]]]:
         """Yield the orders of turns in which a turn is moved to another actor.

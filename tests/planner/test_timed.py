@@ -74,6 +74,18 @@ def test_the_work_that_overlapping_groups_of_hands_share_bounds_the_makespan() -
     assert timed.scheduler == "exchanges"
 
 
+@pytest.mark.parametrize(("name", "n", "hands", "most"), [("handover", 4, 3, 26), ("swap", 10, 2, 42)])
+def test_turns_change_places_together_with_the_turns_that_depend_on_them(
+    name: str, n: int, hands: int, most: int
+) -> None:
+    problem = family(name, n, 1, hands)
+    found = solve(Request(problem)).plan
+    assert found is not None
+    timed = in_time(problem, found).plan
+    assert timed is not None
+    assert timed.makespan <= most
+
+
 def test_hands_pass_cups_in_both_directions_without_waiting_for_places() -> None:
     problem = family("handover", 4, 1)
     found = plan(problem).plan
