@@ -62,7 +62,7 @@ PAIR, FEWER, SHARE = 100_000, 200_000, 0.5
 """
 FEW = 3
 """Maximum number of distinguished values of a symbol; if more are needed, all its values are distinguished."""
-ReachabilityQuestion: TypeAlias = "tuple[str, Symbol, str]"
+ReachabilityQuestion: TypeAlias = "tuple[str, str, tuple[str, ...], str]"
 """Kinds of questions about reachability: can a symbol get a value (`GETS`), can a symbol lose its value (`LEAVES`), which amounts
 can a symbol get (`RANGE`), can a condition on the final state hold (`ENDS`)?"""
 GETS, LEAVES, RANGE, ENDS = "gets", "leaves", "range", "ends"
@@ -160,7 +160,9 @@ class Relaxed:
         """Return whether a symbol can get a value."""
         if self.lowest.initial(symbol) == value:
             return True
-        return value in self.lowest.given[symbol.situation] and self._ask((GETS, symbol, value))
+        return value in self.lowest.given[symbol.situation] and self._ask(
+            (GETS, symbol.situation, symbol.arguments, value)
+        )
 
     def may_not(self, symbol: Symbol, value: str) -> bool:
         """Return whether a symbol can get a value other than the given one."""
@@ -168,23 +170,24 @@ class Relaxed:
             return True
         if self.problem.domain.situations[symbol.situation].boolean:
             return self.may(symbol, FALSE if value == TRUE else TRUE)
-        return self._ask((LEAVES, symbol, value))
+        return self._ask((LEAVES, symbol.situation, symbol.arguments, value))
 
     def between(self, symbol: Symbol) -> Range:
         """Return the range of the amounts that a symbol can get; the definition of a derived amount determines its range."""
         if symbol.situation in self.problem.domain.aggregates:
             return self.lowest.allowed(symbol)
         first = self.lowest.initial(symbol)
-        self._ask((RANGE, symbol, first))
+        self._ask((RANGE, symbol.situation, symbol.arguments, first))
         return self.ranges.get(symbol, Range(number(first), number(first)))
 
     def _ask(self, key: ReachabilityQuestion) -> bool:
         self.reads[key] = None
-        if key not in self._readers:
-            self._readers[key] = {}
+        readers = self._readers.get(key)
+        if readers is None:
+            readers = self._readers[key] = {}
             self._waiting[key] = None
         if self._asking is not None:
-            self._readers[key][self._asking] = None
+            readers[self._asking] = None
         return key in self.possible
 
     # -------------------------------------------------------------------------------------------- computing the answers
@@ -207,15 +210,15 @@ class Relaxed:
 
         `reads` records the other questions on which the answer depends.
         """
-        kind, symbol, value = key
+        kind, situation, arguments, value = key
         self._asking, self.reads = key, {}
         reading = FactEvaluation(self.lowest, self)
         if kind == ENDS:
-            return reading.goal(symbol, value)
+            return reading.goal(Symbol(situation, arguments), value)
         if kind == RANGE:
-            return self._wider(reading, symbol)
-        for behavior, effect in self.lowest.effects.get(symbol.situation, ()):
-            words = (*symbol.arguments, value if kind == GETS else None)
+            return self._wider(reading, Symbol(situation, arguments))
+        for behavior, effect in self.lowest.effects.get(situation, ()):
+            words = (*arguments, value if kind == GETS else None)
             for env in self._envs(reading, behavior, effect, (*effect.arguments, effect.value), words):
                 becomes = env.get(effect.value, effect.value)
                 if (becomes == value) is (kind == GETS) and reading.amounts(behavior, env) is not None:
@@ -263,7 +266,7 @@ class Relaxed:
     def certificate(self, goal: State) -> Certificate | None:
         """Return a certificate if some part of a goal isn't reachable."""
         for symbol, wanted in sorted(goal.items()):
-            key = ENDS, symbol, wanted
+            key = ENDS, symbol.situation, symbol.arguments, wanted
             if not self.reachable(key):
                 never, always = self.claims([key])
                 return Certificate(frozenset(never), always, unmet=(Fact(symbol, wanted),))
@@ -278,7 +281,8 @@ class Relaxed:
             if key in seen or key in self.possible:
                 continue
             seen.add(key)
-            kind, symbol, value = key
+            kind, situation, arguments, value = key
+            symbol = Symbol(situation, arguments)
             if kind == RANGE and not (value := self._bounds(symbol)):
                 continue  # the symbol may have any allowed amount
             if kind == GETS:
@@ -532,7 +536,7 @@ def _told_apart(cases: Cases, relaxed: Relaxed, wrong: Iterable[tuple[Symbol, st
     impossible = []
     for symbol, value, has in wrong:
         amount = lowest.quantity(symbol.situation) is not None
-        key = (GETS, symbol, value) if has else (LEAVES, symbol, value)
+        key = GETS if has else LEAVES, symbol.situation, symbol.arguments, value
         known = lowest.initial(symbol) == value if has else lowest.initial(symbol) != value
         if not amount and not known and not relaxed.reachable(key):
             impossible.append(key)

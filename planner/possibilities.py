@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
 from time import perf_counter
-from typing import Protocol, TypeAlias
+from typing import NamedTuple, Protocol, TypeAlias
 
 from confab.planner.checked_conditions import variables
 from confab.planner.checked_definitions import DefinedValues, stratum_of
@@ -58,8 +58,7 @@ class NoTimeLeftError(WorkLimitError):
     """The deadline has passed before the end of a proof or a check."""
 
 
-@dataclass(frozen=True)
-class Range:
+class Range(NamedTuple):
     """The range of an amount or an expression; if `partial`, the expression may have no value in some state."""
 
     low: Bound
@@ -117,6 +116,7 @@ class Lowest:
         for symbol, value in problem.initial.items():
             if symbol.situation not in self.changing:
                 self.holders.setdefault(symbol.situation, []).append((symbol.arguments, value))
+        self._symbols: dict[tuple[str, tuple[str, ...]], Symbol | None] = {}
         self._steps: dict[tuple[int, frozenset[str]], list[tuple[Condition, tuple[str, ...]]]] = {}
         self._conjunctions: dict[tuple[int, ...], tuple[Condition, ...]] = {}
         self._kept: list[object] = []  # keeps objects alive, so that Python reuses no id
@@ -131,15 +131,20 @@ class Lowest:
 
     def exists(self, situation: str, arguments: tuple[str, ...]) -> bool:
         """Return whether a symbol exists: it has an initial value, or is boolean and its arguments belong to the right classes."""
-        if Symbol(situation, arguments) in self.problem.initial:
-            return True
-        kind = self.problem.domain.situations[situation]
-        members = self.problem.members
-        return (
-            kind.boolean
-            and len(arguments) == len(kind.arguments)
-            and all(argument in members(of) for argument, of in zip(arguments, kind.arguments, strict=True))
-        )
+        return self.symbol(situation, arguments) is not None
+
+    def symbol(self, situation: str, arguments: tuple[str, ...]) -> Symbol | None:
+        """Return a symbol, or None if it doesn't exist; each symbol is tested only once."""
+        key = situation, arguments
+        if key not in self._symbols:
+            symbol, kind, members = Symbol(*key), self.problem.domain.situations[situation], self.problem.members
+            there = symbol in self.problem.initial or (
+                kind.boolean
+                and len(arguments) == len(kind.arguments)
+                and all(argument in members(of) for argument, of in zip(arguments, kind.arguments, strict=True))
+            )
+            self._symbols[key] = symbol if there else None
+        return self._symbols[key]
 
     def initial(self, symbol: Symbol) -> str:
         """Return the initial value of an existing symbol."""
@@ -256,13 +261,13 @@ class FactEvaluation:
         """Return whether a symbol may have a value; if `must`, return whether the symbol has the value in every state."""
         lowest = self.lowest
         lowest.spend()
-        if not lowest.exists(situation, arguments):
+        symbol = lowest.symbol(situation, arguments)
+        if symbol is None:
             return False
         if situation in self.problem.domain.rules:
             if value == TRUE:
                 return self._defined(must).follows((situation, arguments))
             return value == FALSE and not self._defined(not must).follows((situation, arguments))
-        symbol = Symbol(situation, arguments)
         if situation not in lowest.changing:
             return lowest.initial(symbol) == value
         if lowest.quantity(situation) is not None:
@@ -285,9 +290,9 @@ class FactEvaluation:
 
     def between(self, situation: str, arguments: tuple[str, ...]) -> Range | None:
         """Return the range of the amount of a symbol, or None if the symbol doesn't exist."""
-        if not self.lowest.exists(situation, arguments):
+        symbol = self.lowest.symbol(situation, arguments)
+        if symbol is None:
             return None
-        symbol = Symbol(situation, arguments)
         if situation not in self.lowest.changing:
             exactly = Fraction(self.lowest.initial(symbol))
             return Range(exactly, exactly)

@@ -308,5 +308,5 @@ def _off(limits: tuple[tuple[str, Fraction], ...], amount: Number) -> Number:
     total: Number = Fraction(0)
     for sign, limit in limits:
         if not COMPARING[sign](amount, limit):
-            total += max(amount - limit, limit - amount)
+            total += amount - limit if amount > limit else limit - amount
     return total

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator
-from typing import Generic, NamedTuple, Protocol, TypeVar
+from typing import Generic, Protocol, TypeAlias, TypeVar
 
 from confab.planner.grounded.task import Task
 from confab.reasoner.limits import check
@@ -20,13 +20,8 @@ MOST_BYTES, STATE_BYTES = 800 * 2**20, 400
 Entry = TypeVar("Entry")
 
 
-class Candidate(NamedTuple):
-    """A candidate state, the operators that lead from the reached state `before` to the candidate, and the cost of its path."""
-
-    before: int
-    operators: tuple[int, ...]
-    state: int
-    cost: float
+Candidate: TypeAlias = "tuple[int, tuple[int, ...], int, float]"
+"""A reached state, the operators that lead from it to a candidate state, the candidate state, and the cost of its path."""
 
 
 class SearchOrder(Protocol):
@@ -60,7 +55,7 @@ def explore(task: Task, order: SearchOrder) -> Iterator[int]:
         The states need more memory than `MOST_BYTES`.
     """
     reached, each = order.reached, STATE_BYTES + task.size // 4
-    first = Candidate(task.initial, (), task.initial, 0.0)
+    first = task.initial, (), task.initial, 0.0
     reached[task.initial] = first
     order.put(first)
     for candidate in order.candidates():
@@ -70,18 +65,22 @@ def explore(task: Task, order: SearchOrder) -> Iterator[int]:
             order.work = 0
             if len(reached) * each + order.bytes > MOST_BYTES:
                 raise MemoryError
-        known = reached.get(candidate.state)
-        if known is None or candidate.cost < known.cost:
-            reached[candidate.state] = candidate
+        _, _, state, cost = candidate
+        known = reached.get(state)
+        if known is None or cost < known[3]:
+            reached[state] = candidate
             order.put(candidate)
 
 
 def path_to(reached: dict[int, Candidate], state: int) -> list[int]:
     """Return the operators on the path from the initial state to a reached state."""
     parts: list[tuple[int, ...]] = []
-    while (candidate := reached[state]).operators:
-        parts.append(candidate.operators)
-        state = candidate.before
+    while True:
+        before, operators, _, _ = reached[state]
+        if not operators:
+            break
+        parts.append(operators)
+        state = before
     return [operator for part in reversed(parts) for operator in part]
 
 
@@ -103,10 +102,12 @@ class OpenList(Generic[Entry]):
 
     def draw(self) -> tuple[int, Entry] | None:
         """Return the number of the queue that is next in turn, and the queue's first entry, or None if all queues are empty."""
-        filled = [which for which, queue in enumerate(self.queues) if queue]
-        if not filled:
+        which = -1
+        for number, queue in enumerate(self.queues):
+            if queue and (which < 0 or self.turns[number] <= self.turns[which]):
+                which = number
+        if which < 0:
             return None
-        which = min(filled, key=lambda which: (self.turns[which], -which))
         self.turns[which] += 1
         return which, self.queues[which][0][2]
 

@@ -65,11 +65,11 @@ class Greedy:
             self.counts.generated += 1
             after = self.task.applied(state, operator)
             if after is not None:
-                yield Candidate(state, (operator,), after, 0.0)
+                yield state, (operator,), after, 0.0
 
     def put(self, candidate: Candidate) -> None:
         """Evaluate a newly reached state; put the state into the open list if the relaxed goal is reachable."""
-        state = candidate.state
+        state = candidate[2]
         if state & self.task.goal == self.task.goal:
             self.best = state
             return
@@ -91,4 +91,4 @@ class Greedy:
             self.open.turns[PREFERRED] -= BOOST
             after, path = self.lookahead(state, evaluation.plan)
             if len(path) > 1:
-                self.jump = Candidate(state, tuple(path), after, 0.0)
+                self.jump = state, tuple(path), after, 0.0

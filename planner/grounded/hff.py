@@ -140,16 +140,16 @@ def heuristic(task: Task) -> Evaluate:
 def cost_left(task: Task) -> Callable[[int], float]:
     """Return a function from a state to the cost of a relaxed plan with the cheapest supporters.
 
-    The cost is infinite if there is no relaxed plan.
+    The cost is infinite if there is no relaxed plan. The state must be reachable from the task's initial state.
     """
     needs, adds, owners, repeated = _relaxed(task)
     costs = [0.0 if owner < 0 else task.costs[owner] for owner in owners]
-    asked = _relevant(needs, adds, task)
-    adds = _only(adds, asked)
+    asked = _relevant(needs, adds, task) & ~_constant(task)
+    needs, adds = _only(needs, asked), _only(adds, asked)
     groups, missing, needed_by = _grouped([bits if adds[o] else [] for o, bits in enumerate(needs)], task.size)
     groups = [[o for o in group if adds[o]] for group in groups]
     always = sorted(o for group, number in zip(groups, missing, strict=True) if not number for o in group)
-    goal = bits_of(task.goal)
+    goal = bits_of(task.goal & asked)
 
     @lru_cache(REMEMBERED)
     def priced(repetitions: Repetitions) -> list[float]:
@@ -216,13 +216,16 @@ def _repetitions(task: Task, repeated: Mapping[AmountPush, object]) -> Callable[
     amounts, known = task.amounts, dict[int, Repetitions]()
     if amounts is None or not repeated:
         return lambda state: ()
+    differences = list(dict.fromkeys(difference for difference, _, _ in repeated))
+    asked = [(differences.index(difference), sign, push) for difference, sign, push in repeated]
     same = dict[Repetitions, Repetitions]()
 
     def of(state: int) -> Repetitions:
         found = known.get(state >> amounts.size)
         if found is None:
             vector = amounts.vector(state)
-            found = tuple(_times(difference.of(vector), sign, push) for difference, sign, push in repeated)
+            worth = [difference.of(vector) for difference in differences]
+            found = tuple([_times(worth[place], sign, push) for place, sign, push in asked])
             found = known[state >> amounts.size] = same.setdefault(found, found)
         return found
 
@@ -242,6 +245,13 @@ def _relevant(needs: Sequence[Sequence[int]], adds: Sequence[Sequence[int]], tas
                 found.update(fresh)
                 waiting += fresh
     return union(1 << bit for bit in found)
+
+
+def _constant(task: Task) -> int:
+    """Return the mask of the initial bits that no operator clears."""
+    cleared = union(bits for operator in range(len(task)) for _, bits, _ in task.changes_of(operator)[1])
+    compared = 0 if task.amounts is None else task.amounts.compared
+    return task.initial & (1 << task.size) - 1 & ~(cleared | task.derived.mask | compared)
 
 
 def _only(lists: Sequence[Sequence[int]], mask: int) -> list[list[int]]:
@@ -316,9 +326,10 @@ def _push(task: Task, relaxed: int, difference: Linear, sign: str) -> Exact | No
     """
     amounts, owner = task.amounts, task.owners[relaxed]
     assert amounts is not None
-    own = sum(1 << bit for bit in task.needs[relaxed])
+    moves = amounts.made(owner) if owner >= 0 else ()
+    own = union(1 << bit for bit in task.needs[relaxed]) if any(move.when for move in moves) else 0
     certain, others = list[Move](), list[Move]()
-    for move in amounts.made(owner) if owner >= 0 else ():
+    for move in moves:
         (certain if move.when & own == move.when else others).append(move)
     alone = [(move, pushes([move], difference)) for move in others]
     if sign == "=" and any(push is not False and push != 0 for _, push in alone):

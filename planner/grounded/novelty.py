@@ -81,25 +81,23 @@ class Novelty:
                 change = plain[operator]
                 after = state & change[0] | change[1] if change else task.applied(state, operator)
                 if after is not None:
-                    yield Candidate(state, (operator,), after, 0.0)
+                    yield state, (operator,), after, 0.0
                     if self.best is not None:
                         return
 
     def put(self, candidate: Candidate) -> None:
         """Rank a newly reached state by its novel facts."""
-        state, parent = candidate.state, self.parent
+        state, parent = candidate[2], self.parent
         missing, unmet = self.task.goal & ~state, parent.unmet & ~state
         if not missing:
             self.best = state
             return
         open_ = missing.bit_count() + unmet.bit_count()
-        node = Node(state, open_, unmet, -1, 0)
-        if open_ >= parent.open:
-            node = Node(state, open_, unmet, parent.wanted, parent.met | state & parent.wanted)
-        progress = open_, node.met.bit_count()
+        wanted, met = (-1, 0) if open_ < parent.open else (parent.wanted, parent.met | state & parent.wanted)
+        progress = open_, met.bit_count()
         old = self.seen[progress]
         self.seen[progress] = old | state
-        self.open.push((not state & ~old, open_, -len(self.reached)), node)
+        self.open.push((not state & ~old, open_, -len(self.reached)), Node(state, open_, unmet, wanted, met))
 
     def relaxed(self, node: Node) -> Node | None:
         """Return a node with the facts of a relaxed plan, or None if the goal is unreachable."""

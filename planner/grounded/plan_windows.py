@@ -32,6 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from confab.planner.grounded.amounts import Amounts, Linear
+from confab.planner.grounded.derived_arrays import union
 from confab.planner.grounded.hff import cost_left
 from confab.planner.grounded.joins import Ints
 from confab.planner.grounded.routes import rerouted
@@ -230,6 +231,7 @@ class _Windows:
     deadline: float | None
     failed: set[tuple[int, int, float]] = field(default_factory=set)
     """Windows of steps that weren't replaced, each as a state, required bits and a cost."""
+    _cleared: dict[int, int] = field(default_factory=dict)
 
     @cached_property
     def cut(self) -> float:
@@ -389,11 +391,17 @@ class _Windows:
         for operator in owners[order].tolist():
             if len(chosen) >= OPERATORS:
                 break
-            if operator >= 0 and not any(
-                cleared & kept and not when for when, cleared, _ in task.changes_of(operator)[1]
-            ):
+            if operator >= 0 and not self.cleared(operator) & kept:
                 chosen[operator] = None
         return sorted(chosen)
+
+    def cleared(self, operator: int) -> int:
+        """Return the mask of the bits that an operator clears without a further condition; it is computed only once."""
+        found = self._cleared.get(operator)
+        if found is None:
+            changes = self.task.changes_of(operator)[1]
+            found = self._cleared[operator] = union(cleared for when, cleared, _ in changes if not when)
+        return found
 
     def part(self, operators: list[int], state: int, wanted: int) -> tuple[Task, list[int]]:
         """Return the task of reaching the required bits from a state by the given operators, and the operators of this task.
@@ -448,6 +456,7 @@ class _Windows:
             change=change,
             describe=lambda operator: task.describe(operators[operator]),
             barred=set(),
+            whole=None,
             _changes={},
         )
         return part, operators
@@ -473,6 +482,7 @@ class _Windows:
             describe=lambda operator: task.describe(operators[operator]),
             barred=set(),
             amounts=replace(amounts, moves=lambda operator: of(operators[operator]), _moves={}, _results={}),
+            whole=task,
             _changes={},
         )
 

@@ -270,7 +270,7 @@ class _StopOrders:
 
     def searched(self, state: int, wanted: int, stop: int | None) -> list[int] | None:
         """Search the cheapest connecting steps to the required bits by A*; h is the least cost of one step for a missing bit."""
-        task, usable = self.task, self.usable(state, wanted)
+        task, usable = self.task, [(o, self.task.changes_of(o)[0]) for o in self.usable(state, wanted)]
         reached: dict[int, tuple[float, int, int]] = {state: (0.0, state, -1)}
         queue, done = [(0.0, 0, state)], set[int]()
         while queue and len(done) < STATES:
@@ -285,8 +285,8 @@ class _StopOrders:
                     steps.append(operator)
                 return steps[::-1]
             self.work -= len(usable) * self.factor // TESTS
-            for operator in usable:
-                after = task.applied(now, operator)
+            for operator, asked in usable:
+                after = task.applied(now, operator) if now & asked == asked else None
                 if after is None or after in done:
                     continue
                 cost = reached[now][0] + task.spent(now, operator)

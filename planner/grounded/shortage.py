@@ -119,7 +119,15 @@ class _Sums:
         yield {bit for bit in bits_of(task.goal & ~task.initial) if not self.amounts.compared >> bit & 1}
         kinds = {task.facts[bit].symbol.situation for o in used for bit in self.sets[o] if bit < len(task.facts)}
         for kind in sorted(kinds):
-            yield {bit for bit, fact in enumerate(task.facts) if fact.symbol.situation == kind}
+            yield self.facts[kind]
+
+    @cached_property
+    def facts(self) -> Mapping[str, Set[int]]:
+        """The bits of the facts of each situation type."""
+        found = defaultdict[str, set[int]](set)
+        for bit, fact in enumerate(self.task.facts):
+            found[fact.symbol.situation].add(bit)
+        return found
 
     def worth(self, bits: Set[int], used: Mapping[int, Exact]) -> Mapping[int, Fraction]:
         """Return the worth of each bit: the least amount that an operator consumes to set the bit.

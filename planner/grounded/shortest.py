@@ -67,7 +67,7 @@ class AStar:
         while (drawn := self.open.draw()) is not None:
             self.open.drop(0)
             h, (_, _, state, cost) = drawn[1]
-            if cost > self.reached[state].cost or cost + self.cut * h >= self.upper:
+            if cost > self.reached[state][3] or cost + self.cut * h >= self.upper:
                 continue  # a cheaper path to the state or a cheap enough plan was found
             self.lower = max(self.lower, cost + self.weight * h)
             self.work += 1
@@ -77,16 +77,16 @@ class AStar:
                 if after is not None:
                     self.counts.generated += 1
                     spent = task.spent(state, operator) if priced else costs[operator]
-                    yield Candidate(state, (operator,), after, cost + spent)
+                    yield state, (operator,), after, cost + spent
 
     def put(self, candidate: Candidate) -> None:
         """Rank a state by f; drop the state if its estimated total cost reaches `upper`; at a goal state, decrease `upper`."""
-        cost = candidate.cost
-        h = self.bound(candidate.state)
+        _, _, state, cost = candidate
+        h = self.bound(state)
         if cost + self.cut * h >= self.upper:
             return
-        if candidate.state & self.task.goal == self.task.goal:
-            self.upper, self.best = cost, candidate.state
+        if state & self.task.goal == self.task.goal:
+            self.upper, self.best = cost, state
         else:
             self.open.push((cost + self.weight * h, h), (h, candidate))
 

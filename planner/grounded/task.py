@@ -109,6 +109,8 @@ class Task:
         The amounts of the task, or None if no operator changes an amount.
     prices : mapping of operator to Linear
         The costs that depend on amounts.
+    whole : Task, optional
+        A task with the same bits, of which this task is a part.
     barred : set of (state, operator)
         Pairs of a state and an operator that the search excludes, because the operator's step has no refinement in the state.
     """
@@ -130,6 +132,7 @@ class Task:
     describe: Callable[[int], tuple[str, tuple[str, ...], dict[str, str]]]
     amounts: Amounts | None = None
     prices: Mapping[int, Linear] = field(default_factory=dict)
+    whole: Task | None = field(default=None, repr=False)
     barred: set[tuple[int, int]] = field(default_factory=set, repr=False)
     _changes: dict[int, tuple[int, tuple[BitChange, ...]]] = field(default_factory=dict, repr=False)
 
@@ -195,13 +198,18 @@ class Task:
 
     @cached_property
     def applicable(self) -> Callable[[int], tuple[list[int], int]]:
-        """Function of a state that returns the applicable operators and the number of visited tree nodes."""
-        of_symbol: dict[Symbol, int] = {}
+        """Function of a state that returns the applicable operators and the number of tests."""
+        return tree(self.needs.starts[: len(self) + 1], self.needs.items, self.of_symbol).of
+
+    @cached_property
+    def of_symbol(self) -> Sequence[int]:
+        """For each bit, the mask of all bits of the same symbol."""
+        if self.whole is not None:
+            return self.whole.of_symbol
+        found: dict[Symbol, int] = {}
         for bit, fact in enumerate(self.facts):
-            of_symbol[fact.symbol] = of_symbol.get(fact.symbol, 0) | 1 << bit
-        masks = [of_symbol[fact.symbol] for fact in self.facts]
-        masks += [1 << bit for bit in range(len(self.facts), self.size)]
-        return tree(self.needs.starts[: len(self) + 1], self.needs.items, masks).of
+            found[fact.symbol] = found.get(fact.symbol, 0) | 1 << bit
+        return [found[fact.symbol] for fact in self.facts] + [1 << bit for bit in range(len(self.facts), self.size)]
 
     def changes_of(self, operator: int) -> tuple[int, tuple[BitChange, ...]]:
         """Return the precondition and the changes of an operator; both are computed only once."""

@@ -6,8 +6,9 @@ key, because the hash of a nested condition is slow; they also store the conditi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import compress
 from typing import Any, NamedTuple, TypeAlias
 
 from confab.planner.amount_transitions import amount
@@ -43,7 +44,7 @@ class ConditionTests:
     def __init__(self, program: Program, table: Table) -> None:
         self.program, self.table = program, table
         self._about: dict[int, About] = {}
-        self._known: dict[tuple[object, ...], bool] = {}
+        self._known: dict[tuple[object, ...], list[bool]] = {}
         self._tests: dict[tuple[int, ...], tuple[Callable[..., Any], Sequence[str]]] = {}
         self._worths: dict[int, Callable[..., Any]] = {}
 
@@ -58,21 +59,23 @@ class ConditionTests:
         found: list[str] = test(*[env.get(name) for name in names])
         return found
 
-    def would_hold(self, achiever: Achiever, condition: Condition, env: Env, term: str, value: str) -> bool:
-        """Return whether a condition would hold if the variable `term` had the given value.
+    def fitting(
+        self, achiever: Achiever, condition: Condition, env: Env, term: str, values: Sequence[str]
+    ) -> Iterator[str]:
+        """Return the values of the variable `term` with which a condition would hold.
 
         The result for a static condition is cached for symmetric individuals, unless the condition compares individuals.
         """
         static, compares, others, *_ = self.about(condition)
-        if not static:
-            return self.holds(achiever, condition, {**env, term: value})
         classes = {} if compares else self.program.symmetry.class_of
-        bound = [value if other == term else env.get(other) for other in others]
-        key = id(condition), *[None if one is None else classes.get(one, one) for one in bound]
-        known = self._known.get(key)
+        bound = [env.get(other) for other in others if other != term]
+        key = id(condition), term, *[None if one is None else classes.get(one, one) for one in (*bound, *values)]
+        known = self._known.get(key) if static else None
         if known is None:
-            known = self._known[key] = self.holds(achiever, condition, {**env, term: value})
-        return known
+            known = [self.holds(achiever, condition, {**env, term: value}) for value in values]
+            if static:
+                self._known[key] = known
+        return compress(values, known)
 
     def worth(self, condition: Comparison, env: Env) -> Number:
         """Return the current difference between the left and the right side of a comparison."""

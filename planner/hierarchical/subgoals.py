@@ -188,11 +188,9 @@ class Subgoals:
                 key = self.tests.key(arguments, env)
                 if key is None or key not in self.table.now[situation]:
                     continue
-                values = tuple(
-                    value
-                    for value in self.candidates.values(situation, key, achiever.kinds[term])
-                    if value != env[term] and self.tests.would_hold(achiever, possible, env, term, value)
-                )
+                others = self.candidates.values(situation, key, achiever.kinds[term])
+                fitting = self.tests.fitting(achiever, possible, env, term, others)
+                values = tuple(value for value in fitting if value != env[term])
                 if values:
                     yield situation, key, values
                 if isinstance(condition, Witness) and possible is not condition:
