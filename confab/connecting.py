@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from confab.planner.acting.retries import RetryPolicy
+from confab.planner.acting.retries import DEFAULT, RetryPolicy
 from confab.reasoner.embodiment.interfaces import Interface, read_interface
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.problem import Problem
@@ -45,12 +44,8 @@ def connected(scene: Known, problem: Problem, on: str, seed: int = 0) -> tuple[I
     if lacking := [behavior.name for behavior in lowest if behavior.name not in interface.calls]:
         raise KnowledgeError(f"{name} has no action for {', '.join(lacking)}; state e:carriesOut of one of its actions")
     world = InterfaceWorld(interface, reached(interface, where, seed), problem)
-    retry_policy = RetryPolicy()
-    return world, replace(
-        retry_policy,
-        attempts=interface.attempts or retry_policy.attempts,
-        failures=interface.failures or retry_policy.failures,
-    )
+    attempts, failures = interface.attempts or DEFAULT.attempts, interface.failures or DEFAULT.failures
+    return world, RetryPolicy(attempts, failures)
 
 
 def parts_of(on: str) -> tuple[str, str]:

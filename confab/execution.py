@@ -369,9 +369,10 @@ def execute(
     if both_hands and world not in WORLDS:
         raise KnowledgeError(f"both hands at once: only in the worlds {' and '.join(WORLDS)}")
     in_time = both_hands or (world == "symbolic" and has_times(problem))
-    together = Concurrency(schedule, SPREAD if perturb else Fraction(0)) if in_time else None
+    spread = SPREAD if perturb else Fraction(0)
+    together = Concurrency(schedule, spread) if in_time else None
     if world == "symbolic":
-        symbolic = SymbolicWorld(problem, stretch=_stretched(seed) if perturb else _as_expected)
+        symbolic = SymbolicWorld(problem, stretch=_stretched(seed, spread))
         with possible():
             episode = act(problem, symbolic, plan, wanted, planner, retry_policy, observer, caution, together)
         return Execution(scene, episode)
@@ -410,14 +411,10 @@ def execute(
         return Execution(scene, episode)
 
 
-def _as_expected(seconds: Fraction) -> Fraction:
-    return seconds
-
-
-def _stretched(seed: int) -> Callable[[Fraction], Fraction]:
-    """Return a function that varies durations at random, by at most `SPREAD`."""
+def _stretched(seed: int, spread: Fraction) -> Callable[[Fraction], Fraction]:
+    """Return a function that varies durations at random, by at most the share `spread`."""
     rng = Random(seed)
-    return lambda expected: expected * (1 + SPREAD * Fraction(rng.randint(-1000, 1000), 1000))
+    return lambda expected: expected * (1 + spread * Fraction(rng.randint(-1000, 1000), 1000))
 
 
 def _reach_of(scene: Known) -> str:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, TypeAlias
+from dataclasses import asdict, dataclass, field, replace
+from typing import TYPE_CHECKING, TypeAlias, cast
 
 from confab.formats import AccountJson, BecauseJson, WhyNotJson
 from confab.labels import Labels
@@ -62,15 +62,8 @@ class Because:
 
     def json(self) -> BecauseJson:
         """Return the reasons as JSON data."""
-        return {
-            "number": self.number,
-            "path": list(self.path),
-            "id": self.id,
-            "step": self.step,
-            "what": self.what,
-            "gives": list(self.gives),
-            "needs": list(self.needs),
-        }
+        lists = {"path": [*self.path], "gives": [*self.gives], "needs": [*self.needs]}
+        return cast("BecauseJson", {**asdict(self), **lists})
 
     def __str__(self) -> str:
         """Return the reasons in a few lines."""

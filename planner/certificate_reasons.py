@@ -51,6 +51,8 @@ WORDS, ONE = ("none", "one", "two", "three", "four", "five"), "?one"
 """The small numbers as words, and the name of a variable for a counted individual."""
 SHOWN = 4
 """Maximum number of facts that a sentence names."""
+NOTHING = "no behaviour has this effect"
+"""The cause that is stated if no other cause is found."""
 
 
 @dataclass(frozen=True)
@@ -81,10 +83,8 @@ class Cause:
 def told(problem: Problem, certificate: Certificate) -> Reason:
     """Return the reason, read from a certificate, why a problem has no plan."""
     goals, causes = certificate.unmet[:SHOWN], _Causes(problem, certificate)
-    what, many = (
-        " and ".join(_goal(problem, goal) for goal in goals) + " …" * (len(certificate.unmet) > SHOWN),
-        len(goals) > 1,
-    )
+    what = " and ".join(_goal(problem, goal) for goal in goals) + " …" * (len(certificate.unmet) > SHOWN)
+    many = len(goals) > 1
     how, more = "exclude each other" if many else "can't be reached", tuple[str, ...]()
     if certificate.told_apart:
         text = f"{what} {how}: {_of_cases(certificate)}"
@@ -187,7 +187,7 @@ class _Causes:
         try:
             chain, cause = self.chain(claim)
         except (WorkLimitError, RecursionError):
-            chain, cause = [], Cause("no behaviour has this effect")
+            chain, cause = [], Cause(NOTHING)
         follows = [one for one in reversed(chain) if one.fact != claim.fact]
         so = "".join(f"; so {text}" for text in self.holding(follows))
         return cause.text + so, (*cause.terms, *(word for one in follows for word in _words(one.fact)))
@@ -210,7 +210,7 @@ class _Causes:
         """Return the reader of conditions, and the view that records the used claims, of amounts only if `amounts`."""
         claims = self.claims
         if not amounts:
-            always = {s: v for s, v in self.certificate.always.items() if self.lowest.quantity(s.situation) is None}
+            always = {s: v for s, v in self.certificate.always.items() if not self.amount(s)}
             claims = Claims(self.lowest, replace(self.certificate, always=always))
         view = _ClaimRecorder(claims, ())
         return FactEvaluation(self.lowest, view), view
@@ -225,34 +225,32 @@ class _Causes:
         """
         queue: list[tuple[Claim, ...]] = [(goal,)]
         seen = {goal}
-        first: tuple[tuple[Claim, ...], Cause] | None = None
-        circle: tuple[tuple[Claim, ...], Cause] | None = None
-        stuck: tuple[tuple[Claim, ...], Cause] | None = None
+        found = list[tuple[tuple[Claim, ...], Cause]]()
         for chain in queue:  # the loop appends chains to the queue
-            causes = self.causes(chain[-1], first=len(chain) == 1)
-            for cause in causes:
+            for cause in self.causes(chain[-1], first=len(chain) == 1):
                 if not cause.rests_on:
-                    return list(chain), cause
-                first = first or ((goal,), cause)
-                if stuck is None and all(map(self.kept, cause.rests_on)):
-                    stuck = chain, cause
-                amount = self.lowest.quantity(chain[-1].fact.symbol.situation) is not None
-                if circle is None and amount and {*cause.rests_on} <= {*chain}:
-                    every = [cause, *(other for other in causes if other is not cause)][:SHOWN]
-                    terms = tuple(word for one in every for word in one.terms)
-                    circle = chain, Cause(", and ".join(one.text for one in every), terms)
-                for claim in cause.rests_on:
-                    if claim not in seen:
-                        seen.add(claim)
-                        queue.append((*chain, claim))
-        if circle is None and stuck is not None:
-            chain, cause = stuck
-            held = [claim for claim in sorted(seen, key=str) if self.kept(claim) and claim not in chain]
-            because = f", because {' and '.join(self.holding(held))}" if len(held) > 1 else ""
-            words = [word for claim in held for word in _words(claim.fact)]
-            circle = chain, Cause(cause.text + because, (*cause.terms, *words))
-        found, cause = circle or first or ((goal,), Cause("no behaviour has this effect"))
-        return [*found], cause
+                    return [*chain], cause
+                found.append((chain, cause))
+                queue += [(*chain, claim) for claim in dict.fromkeys(cause.rests_on) if claim not in seen]
+                seen.update(cause.rests_on)
+        for chain, cause in found:
+            if self.amount(chain[-1].fact.symbol) and {*cause.rests_on} <= {*chain}:
+                others = [other for of, other in found if of is chain and other is not cause]
+                every = [cause, *others][:SHOWN]
+                return [*chain], Cause(
+                    ", and ".join(one.text for one in every), tuple(w for one in every for w in one.terms)
+                )
+        for chain, cause in found:
+            if all(map(self.kept, cause.rests_on)):
+                held = [claim for claim in sorted(seen, key=str) if self.kept(claim) and claim not in chain]
+                because = f", because {' and '.join(self.holding(held))}" if len(held) > 1 else ""
+                words = [word for claim in held for word in _words(claim.fact)]
+                return [*chain], Cause(cause.text + because, (*cause.terms, *words))
+        return [goal], found[0][1] if found else Cause(NOTHING)
+
+    def amount(self, symbol: Symbol) -> bool:
+        """Return whether the values of a symbol are amounts."""
+        return self.lowest.quantity(symbol.situation) is not None
 
     def kept(self, claim: Claim) -> bool:
         """Return whether a claim states that a fact always holds."""
@@ -276,7 +274,7 @@ class _Causes:
             given = {p.name: a for p, a in zip(rule.parameters, symbol.arguments, strict=True) if a not in free}
             cause = self.too_few(rule, given) or self.lacking(claim, rule.behavior, rule.conditions, given)
             found.append(cause)
-        amount = lowest.quantity(situation) is not None
+        amount = self.amount(symbol)
         kept = not amount and self.kept(claim)
         for behavior in lowest.behaviors:
             for effect in behavior.every_effect:
@@ -328,7 +326,7 @@ class _Causes:
 
     def exceeded(self, fact: Fact) -> str:
         """Return as text the bound that a goal value exceeds, or an empty text if the value is within bounds."""
-        if self.lowest.quantity(fact.symbol.situation) is None:
+        if not self.amount(fact.symbol):
             return ""
         found = _end_before(self.lowest.bounds_of(fact.symbol.situation), fact.value)
         return f"{_named(fact.symbol)} is at {found[0]} {written(found[1])}" if found else ""
@@ -401,7 +399,7 @@ class _Causes:
         inside = {c.term: c.kind for c in opened if isinstance(c, ClassCondition) and not c.negated and c.term in kinds}
         any(True for _ in reading.solutions(with_classes(opened, given, kinds), given, {**kinds, **inside}))
         text, limits = self.words(opened, given, kinds), ""
-        if any(self.lowest.quantity(fact.symbol.situation) is not None for fact in view.claimed):
+        if any(self.amount(fact.symbol) for fact in view.claimed):
             unclaimed = self.reading(amounts=False)
             if not any(
                 True for _ in unclaimed[0].solutions(with_classes(opened, given, kinds), given, {**kinds, **inside})

@@ -226,13 +226,17 @@ def goals_of(timeline: Timeline, labels: Labels, planned: bool) -> list[GoalData
     return found
 
 
+def called(scene: Known) -> str:
+    """Return the name by which commands load a scene: the name of a shipped scene, the path of its file, or its IRI."""
+    path = scene.knowledge.path
+    return scene.iri if path is None else path.stem if path.is_relative_to(ontology.ROOT) else str(path)
+
+
 def again_of(
     scene: Known, problem: Problem, report: Report | None, execution: ExecutionView | None, physical: bool
 ) -> str:
     """Return the command that repeats a planning call, a verification or an execution."""
-    path = scene.knowledge.path
-    name = scene.iri if path is None else path.stem if path.is_relative_to(ontology.ROOT) else str(path)
-    changed = [name, *scene.knowledge.changes]
+    changed = [called(scene), *scene.knowledge.changes]
     if execution is not None:
         people = [part for i, _ in execution.episode.interventions for part in ("--intervene", i.text)]
         return join(["confab", "execute", *changed, *(["--world", "pybullet"] if physical else []), *people])

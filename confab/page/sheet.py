@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, TypedDict
 
-from confab import ontology
 from confab.accepting import check_goal, possible, shipped_queries
 from confab.known import Known
 from confab.labels import Labels, labels_of
 from confab.page.data import page_data
+from confab.page.results import called
 from confab.page.schema import PageData, ReadyQuery, Turnable, TurnableRow
 from confab.planner.plan import Limits
 from confab.planner.solve import DEFAULT_MODE, Request, solve
@@ -195,9 +195,7 @@ class Sheet:
 
     def _again(self, by: Turned) -> str:
         """Return the command or the Python code that reproduces the result."""
-        path = self.scene.knowledge.path
-        shipped = path is not None and path.is_relative_to(ontology.ROOT)
-        name = self.scene.iri if path is None else path.stem if shipped else str(path)
+        name = called(self.scene)
         facts = [f"{key} {value}" for key, value in by.get("facts", {}).items()]
         goals = [f"{key} {value}" for key, value in by.get("goals", {}).items() if value is not None]
         dropped = [key for key, value in by.get("goals", {}).items() if value is None]

@@ -45,6 +45,7 @@ from confab.planner.acting.unreached import blamed, blocked, unrestored, with_di
 from confab.planner.acting.world import INTERRUPTED, WITHOUT_EFFECT, Guarded, Verdict, World, WorldError, WorldReport
 from confab.planner.hierarchical.planner import plan as hierarchical_plan
 from confab.planner.plan import Limits, Outcome, Plan, Planner, Reason, SoftGoal, Status, Step, renumbered
+from confab.planner.plan import changed as facts_changed
 from confab.planner.plan_costs import cost_of
 from confab.planner.timed.activities import InapplicableError, StepSimulation
 from confab.planner.timed.pieces import actors_of_step, default_actors
@@ -125,6 +126,8 @@ def act(
                 chain, before, verdict = run.perform(expected)
                 if not verdict.ok:
                     run.learn_from(chain, before, verdict)
+            if len(run.record.events) >= run.retries.most:
+                run.give_up(Reason(f"stopped at the limit of {run.retries.most} primitives"))
     except (WorldError, LimitError) as error:
         run.world.stop()
         run.break_off(str(error))
@@ -305,7 +308,7 @@ class _RunningEpisode:
         """
         chain, record = next(chains_of(self.agenda.steps)), self.record
         step, before = chain[-1], self.belief.problem.initial
-        changes = [Fact(s, v) for s, v in sorted(expected.items()) if before.get(s) != v]
+        changes = facts_changed(before, expected)
         start = self.begin(chain, before)
         self.say("begin", step, changes)
         begin = self.world.seconds
@@ -330,8 +333,6 @@ class _RunningEpisode:
         if surprises:
             self.request_replan("", surprises)
         self.say("end", step, changes)
-        if len(record.events) >= self.retries.most:
-            self.give_up(Reason(f"stopped at the limit of {self.retries.most} primitives"))
         return chain, before, verdict
 
     def begin(self, chain: tuple[Step, ...], before: State) -> State:
@@ -434,8 +435,6 @@ class _RunningEpisode:
             )
         elif surprises or self.agenda.steps:
             self.request_replan("" if surprises else "the actors were interrupted", surprises)
-        if len(record.events) >= self.retries.most:
-            self.give_up(Reason(f"stopped at the limit of {self.retries.most} primitives"))
         for chain, before, verdict in failed:
             self.together = self.together if verdict.code == INTERRUPTED or self.by_the_clock else None
             self.learn_from(chain, before, verdict)
