@@ -58,7 +58,7 @@ def plan_level(
     level: int | None = None,
     limits: Limits = Limits(),  # noqa: B008 - frozen
     most_work: float = math.inf,
-    most_rows: int | None = None,
+    most_rows: int = MOST_ROWS,
 ) -> Outcome:
     """Plan one level of a problem, by default the lowest level; symbols that are initially at rest are at rest in the end.
 
@@ -70,7 +70,7 @@ def plan_level(
         Maximum number of expansions by h_FF, and maximum time in seconds, including grounding.
     most_work : float
         Maximum work, in bits processed by relaxed plans.
-    most_rows : int, optional
+    most_rows : int
         Maximum number of rows of one join when the level is grounded.
 
     Returns
@@ -82,7 +82,7 @@ def plan_level(
     deadline = limits.end()
     level = problem.domain.levels[-1] if level is None else level
     try:
-        task = ground(problem, level, None, problem.goal_on(level), most_rows or MOST_ROWS, deadline)
+        task = ground(problem, level, None, problem.goal_on(level), most_rows, deadline)
     except (UngroundableError, OutOfTimeError) as error:
         return Outcome(Status.GAVE_UP, reason=Reason(f"grounding stopped: {error}"), seconds=perf_counter() - began)
     except MemoryError:

@@ -11,7 +11,6 @@ relevant steps. Longer sequences and other steps require the search of a scope (
 from __future__ import annotations
 
 from collections.abc import Mapping
-from collections.abc import Set as AbstractSet
 from typing import TypeAlias
 
 from confab.planner.hierarchical.relevance import relevant
@@ -35,113 +34,94 @@ class FewSteps:
         self.found: list[Ground] = []
         self.barred: set[Barred] = set()
 
-    def search(self) -> list[Ground] | None:
-        """Return steps that achieve the targets, or None if no steps are found."""
-        found = find(self.space, self.level, self.targets, self.keep, self.longest, self.barred)
-        self.found = found or []
-        return found
-
     def bar(self, position: int) -> None:
         """Exclude the step at `position` of the last result from the next search, in the current state of the table."""
         self.barred.add((self.found[position], frozenset(self.space.table.since(self.mark).items())))
 
+    def search(self) -> list[Ground] | None:
+        """Return the shortest sequence of relevant steps that achieves all targets and respects `keep`.
 
-def find(
-    space: Workspace,
-    level: int,
-    targets: Mapping[Cell, str],
-    keep: Keep,
-    longest: int,
-    barred: AbstractSet[Barred] = frozenset(),
-) -> list[Ground] | None:
-    """Return the shortest sequence of relevant steps that achieves all targets and respects `keep`; the table stays unchanged.
+        The table stays unchanged. Return None if no sequence of at most `longest` steps is found.
+        """
+        space, level, table, now = self.space, self.level, self.space.table, self.space.table.now
+        counts, widest = space.counts[level], space.widest[level]
+        origin: dict[Cell, str] = {}
+        steps: list[Ground] = []
+        left = MOST_EXPANSIONS
+        seen: dict[frozenset[tuple[Cell, str]], int] = {}
 
-    Return None if no sequence of at most `longest` steps is found.
-    """
-    table, now = space.table, space.table.now
-    counts, widest = space.counts[level], space.widest[level]
-    origin: dict[Cell, str] = {}
-    steps: list[Ground] = []
-    left = MOST_EXPANSIONS
-    seen: dict[frozenset[tuple[Cell, str]], int] = {}
-
-    def deepen(depth: int, off: dict[Cell, str], changed: dict[Cell, str]) -> bool:
-        nonlocal left
-        if not off:
-            return True
-        if len(off) > depth * widest or left <= 0:
+        def deepen(depth: int, off: dict[Cell, str], changed: dict[Cell, str]) -> bool:
+            nonlocal left
+            if not off:
+                return True
+            if len(off) > depth * widest or left <= 0:
+                return False
+            here = frozenset(changed.items())
+            if seen.get(here, 0) >= depth:
+                return False
+            seen[here] = depth
+            left -= 1
+            space.expand(level)
+            mark = len(table.trail)
+            for ground in relevant(space, level, off, depth):
+                if self.barred and (ground, here) in self.barred:
+                    continue
+                counts.generated += 1
+                done = self._step(ground, off, changed, origin)
+                if done is not None:
+                    steps.append(ground)
+                    if deepen(depth - 1, *done):
+                        return True
+                    steps.pop()
+                    table.undo(mark)
             return False
-        here = frozenset(changed.items())
-        if seen.get(here, 0) >= depth:
-            return False
-        seen[here] = depth
-        left -= 1
-        space.expand(level)
-        mark = len(table.trail)
-        for ground in relevant(space, level, off, depth):
-            if barred and (ground, here) in barred:
-                continue
-            counts.generated += 1
-            done = _step(space, ground, off, changed, origin, targets, keep)
-            if done is not None:
-                steps.append(ground)
-                if deepen(depth - 1, *done):
-                    return True
-                steps.pop()
-                table.undo(mark)
-        return False
 
-    start = len(table.trail)
-    off = {cell: value for cell, value in targets.items() if not meets(now[cell[0]].get(cell[1], FALSE), value)}
-    for depth in range(1, longest + 1):
-        found = deepen(depth, off, {})
-        table.undo(start)
-        if found:
-            return steps
-        if left <= 0:
-            return None
-    return None
-
-
-def _step(
-    space: Workspace,
-    ground: Ground,
-    off: Mapping[Cell, str],
-    changed: Mapping[Cell, str],
-    origin: dict[Cell, str],
-    targets: Mapping[Cell, str],
-    keep: Keep,
-) -> tuple[dict[Cell, str], dict[Cell, str]] | None:
-    """Apply a behaviour to the table; return `off` and `changed` afterwards, or None if the behaviour isn't applicable."""
-    now = space.table.now
-    done = space.forward[ground[0]](*ground[1])
-    if done is None:
+        self.found = steps
+        off = {
+            cell: value for cell, value in self.targets.items() if not meets(now[cell[0]].get(cell[1], FALSE), value)
+        }
+        for depth in range(1, self.longest + 1):
+            found = deepen(depth, off, {})
+            table.undo(self.mark)
+            if found:
+                return steps
+            if left <= 0:
+                break
         return None
-    still, changes = dict(off), dict(changed)
-    for situation, key, value in done[1]:
-        old = now[situation].get(key)
-        if old is None:
-            if not space.exists(situation, key):
+
+    def _step(
+        self, ground: Ground, off: Mapping[Cell, str], changed: Mapping[Cell, str], origin: dict[Cell, str]
+    ) -> tuple[dict[Cell, str], dict[Cell, str]] | None:
+        """Apply a behaviour to the table; return `off` and `changed` afterwards, or None if the behaviour isn't applicable."""
+        space, targets, keep, now = self.space, self.targets, self.keep, self.space.table.now
+        done = space.forward[ground[0]](*ground[1])
+        if done is None:
+            return None
+        still, changes = dict(off), dict(changed)
+        for situation, key, value in done[1]:
+            old = now[situation].get(key)
+            if old is None:
+                if not space.exists(situation, key):
+                    continue
+                old = FALSE
+            if old == value:
                 continue
-            old = FALSE
-        if old == value:
-            continue
-        space.table.put(situation, key, value)
-        cell = situation, key
-        first = origin.setdefault(cell, old)
-        if value == first:
-            changes.pop(cell, None)
-        else:
-            changes[cell] = value
-        wanted = targets.get(cell) or keep(cell, first)
-        if wanted is None or wanted == value or meets(value, wanted):
-            still.pop(cell, None)
-        else:
-            still[cell] = wanted
-    for cell in space.defined:
-        wanted = targets.get(cell) or keep(cell, "")
-        if wanted and now[cell[0]].get(cell[1]) != wanted:
-            still[cell] = wanted
-        else:
-            still.pop(cell, None)
-    return still, changes
+            space.table.put(situation, key, value)
+            cell = situation, key
+            first = origin.setdefault(cell, old)
+            if value == first:
+                changes.pop(cell, None)
+            else:
+                changes[cell] = value
+            wanted = targets.get(cell) or keep(cell, first)
+            if wanted is None or wanted == value or meets(value, wanted):
+                still.pop(cell, None)
+            else:
+                still[cell] = wanted
+        for cell in space.defined:
+            wanted = targets.get(cell) or keep(cell, "")
+            if wanted and now[cell[0]].get(cell[1]) != wanted:
+                still[cell] = wanted
+            else:
+                still.pop(cell, None)
+        return still, changes
