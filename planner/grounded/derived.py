@@ -52,11 +52,6 @@ class Derived:
         ]
 
     @cached_property
-    def needed(self) -> int:
-        """Mask of the bits that alternatives require."""
-        return union(way for part in self.parts for bit in part for way in bit.alternatives)
-
-    @cached_property
     def effort(self) -> int:
         """Maximum number of alternatives examined after a change.
 
@@ -169,35 +164,6 @@ class Derived:
     def _part_of(self) -> Mapping[int, int]:
         return {bit.mask: number for number, part in enumerate(self.parts) for bit in part}
 
-    def within(self, state: int, changing: int, wanted: int) -> Derived:
-        """Return the derived bits that the bits `wanted` depend on, simplified for states with fixed bits.
-
-        The states differ from `state` only in the bits `changing`.
-        """
-        parts = []
-        for number in self._support(wanted & self.mask):
-            part = self.parts[number]
-            own = sum(bit.mask for bit in part)
-            if changing & ~own & union(way for bit in part for way in bit.alternatives):
-                changing |= own
-                parts.append(part)
-        fixed = state & ~changing
-
-        def left(bit: Bit) -> Bit:
-            ways = (way & changing for way in bit.alternatives if not way & ~changing & ~fixed)
-            return replace(bit, alternatives=tuple(dict.fromkeys(ways)))
-
-        return Derived(tuple(tuple(map(left, part)) for part in parts))
-
-    def renamed(self, small: Callable[[int], int]) -> Derived:
-        """Return the same derived bits with all masks converted by the function `small`."""
-        return Derived(
-            tuple(
-                tuple(Bit(small(bit.mask), tuple(map(small, bit.alternatives)), bit.opposite) for bit in part)
-                for part in self.parts
-            )
-        )
-
     @cached_property
     def _users(self) -> Mapping[int, Sequence[tuple[int, int, bool]]]:
         """The parts that require a bit, by the bit.
@@ -277,10 +243,10 @@ def _by_counting(part: tuple[Bit, ...]) -> Callable[[int], int]:
 
 
 def in_parts(bits: Mapping[int, Bit]) -> Derived:
-    """Return derived bits grouped into parts, each after its dependencies (Tarjan, SIAM Journal on Computing 1, 1972).
+    """Return derived bits grouped into parts, each after its dependencies.
 
-    A part is a strongly connected component of the dependencies. If an alternative of a bit requires the bit itself, the
-    alternative is dropped. Otherwise the bit would stay set forever.
+    A part is a strongly connected component of the dependencies (Sharir, Computers & Mathematics with Applications 7, 1981). If an
+    alternative of a bit requires the bit itself, the alternative is dropped. Otherwise the bit would stay set forever.
     """
     bits = {number: bit if bit.opposite else _grounded(bit) for number, bit in bits.items()}
     numbers = {bit.mask: number for number, bit in bits.items()}
@@ -288,43 +254,29 @@ def in_parts(bits: Mapping[int, Bit]) -> Derived:
         number: [numbers[low] for low in single(union(bit.alternatives)) if low in numbers]
         for number, bit in bits.items()
     }
-    index: dict[int, int] = {}
-    lowest: dict[int, int] = {}
-    stack: list[int] = []
-    on_stack: set[int] = set()
-    parts: list[tuple[Bit, ...]] = []
-    for root in bits:
-        if root in index:
-            continue
-        work = [(root, iter(needs[root]))]
-        index[root] = lowest[root] = len(index)
-        stack.append(root)
-        on_stack.add(root)
-        while work:
-            number, rest = work[-1]
-            for other in rest:
-                if other not in index:
-                    index[other] = lowest[other] = len(index)
-                    stack.append(other)
-                    on_stack.add(other)
-                    work.append((other, iter(needs[other])))
-                    break
-                if other in on_stack:
-                    lowest[number] = min(lowest[number], index[other])
-            else:
-                work.pop()
-                if work:
-                    lowest[work[-1][0]] = min(lowest[work[-1][0]], lowest[number])
-                if lowest[number] == index[number]:
-                    part = []
-                    while True:
-                        member = stack.pop()
-                        on_stack.discard(member)
-                        part.append(bits[member])
-                        if member == number:
-                            break
-                    parts.append(tuple(part))
-    return Derived(tuple(parts))
+    users: dict[int, list[int]] = {number: [] for number in bits}
+    for number, needed in needs.items():
+        for other in needed:
+            users[other].append(number)
+    seen: set[int] = set()
+    order = [number for root in bits for number in _postorder(root, users, seen)]
+    seen = set()
+    parts = (tuple(map(bits.__getitem__, _postorder(root, needs, seen))) for root in reversed(order))
+    return Derived(tuple(filter(None, parts)))
+
+
+def _postorder(root: int, following: Mapping[int, Sequence[int]], seen: set[int]) -> list[int]:
+    """Return the unseen numbers that are reached from a number, each after the numbers reached from it; add them to `seen`."""
+    found: list[int] = []
+    waiting = [(root, False)]
+    while waiting:
+        number, finished = waiting.pop()
+        if finished:
+            found.append(number)
+        elif number not in seen:
+            seen.add(number)
+            waiting += [(number, True), *((other, False) for other in following[number])]
+    return found
 
 
 def _grounded(bit: Bit) -> Bit:

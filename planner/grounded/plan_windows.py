@@ -25,19 +25,18 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from heapq import heappop, heappush
-from itertools import chain
 from time import perf_counter
 
 import numpy as np
 from numpy.typing import NDArray
 
-from confab.planner.grounded.amounts import Amounts, Linear
+from confab.planner.grounded.amounts import Linear
 from confab.planner.grounded.derived_arrays import union
 from confab.planner.grounded.hff import cost_left
 from confab.planner.grounded.joins import Ints
 from confab.planner.grounded.routes import rerouted
 from confab.planner.grounded.shortest import Estimate, each_goal_alone, shortest
-from confab.planner.grounded.task import BitChange, Grouped, Task, bits_of
+from confab.planner.grounded.task import Grouped, Task, bits_of
 from confab.planner.plan_costs import TRIFLE
 
 STATES, STEPS = 400, 12
@@ -59,8 +58,8 @@ RANKED = 20
 """Work of ranking a state by the lower bound."""
 TRIALS = 2_000_000
 """Maximum number of replayed operators when superfluous steps are removed."""
-LOOK, BITS = 50, 400
-"""Number of operators that are ranked, and of bits that are renumbered, in the time in which one operator is examined."""
+LOOK = 50
+"""Number of operators that are ranked in the time in which one operator is examined."""
 
 
 def shorter(
@@ -296,8 +295,7 @@ class _Windows:
         if (state, wanted, spent) in self.failed:
             return None
         operators = self.near(steps, state, wanted)
-        self.work -= len(operators) * self.task.size // BITS
-        task, operators = self.part(operators, state, wanted)
+        task = self.part(operators, state, wanted)
         found = self.search(task, spent, self.most, cost_left(task), len(task.owners), cut=self.cut)
         return None if found is None else [operators[operator] for operator in found]
 
@@ -341,9 +339,10 @@ class _Windows:
         )
 
     def flags(self, bits: int) -> NDArray[np.bool_]:
-        """Return an array that contains, for each bit, whether the bit is set."""
-        packed = np.frombuffer(bits.to_bytes((self.task.size + 7) // 8, "little"), np.uint8)
-        return np.unpackbits(packed, count=self.task.size, bitorder="little").astype(bool)
+        """Return an array that contains, for each bit of the task, whether the bit is set."""
+        size = self.task.size
+        packed = np.frombuffer((bits & (1 << size) - 1).to_bytes((size + 7) // 8, "little"), np.uint8)
+        return np.unpackbits(packed, count=size, bitorder="little").astype(bool)
 
     def near(self, steps: Sequence[int], state: int, wanted: int) -> list[int]:
         """Return the operators nearest to a window in ascending order, including the operators of the window.
@@ -353,12 +352,11 @@ class _Windows:
         """
         task, far = self.task, 1000
         owners, _, _ = self.arrays
-        at_first = self.flags(state & (1 << task.size) - 1)
+        at_first = self.flags(state)
         forward = np.full(len(owners), far)
         known = at_first.copy()
         for depth in range(len(steps)):
-            sums = np.concatenate([[0], np.cumsum(known[task.needs.items])])
-            ready = (np.diff(sums[task.needs.starts]) == np.diff(task.needs.starts)) & (forward == far)
+            ready = (counts(known, task.needs) == np.diff(task.needs.starts)) & (forward == far)
             if not ready.any():
                 break
             self.work -= len(owners) // LOOK
@@ -373,8 +371,7 @@ class _Windows:
         later = np.zeros(task.size, bool)
         for depth in range(len(steps)):
             self.work -= len(owners) // LOOK
-            sums = np.concatenate([[0], np.cumsum(target[task.adds.items])])
-            helps = (np.diff(sums[task.adds.starts]) > 0) & (backward == far) & (forward < far)
+            helps = (counts(target, task.adds) > 0) & (backward == far) & (forward < far)
             target |= later
             later[:] = False
             if helps.any():
@@ -403,74 +400,31 @@ class _Windows:
             found = self._cleared[operator] = union(cleared for when, cleared, _ in changes if not when)
         return found
 
-    def part(self, operators: list[int], state: int, wanted: int) -> tuple[Task, list[int]]:
-        """Return the task of reaching the required bits from a state by the given operators, and the operators of this task.
+    def part(self, operators: Sequence[int], state: int, wanted: int) -> Task:
+        """Return the task of reaching the required bits from a state by the given operators; its states have the same bits.
 
-        The task has no bits for symbols that the given operators don't change. An operator is excluded if it requires that such a
-        symbol has another value than in these states.
+        The task has no relaxed operators for derived bits that the operators can't change, and for conditions that can't hold.
         """
-        task = self.task
-        if task.amounts is not None:
-            return self._part_with_amounts(task.amounts, operators, state, wanted), operators
-        changing, asked = 0, wanted
-        for operator in operators:
-            precondition, changes = task.changes_of(operator)
-            asked |= precondition
-            for when, cleared, set_ in changes:
-                asked |= when
-                changing |= cleared | set_
-        derived = task.derived.within(state, changing, asked)
-        bits = derived.mask | changing & (asked | derived.needed)
-        missing = asked & ~(changing | derived.mask | state)
-        operators = [operator for operator in operators if not task.changes_of(operator)[0] & missing]
-        rows = self._rows(operators)
-        lost = set(bits_of(missing))
-        rows = [r for r in rows if lost.isdisjoint(task.needs[r])]
-        new = {bit: i for i, bit in enumerate(bits_of(bits))}
-
-        def small(state: int) -> int:
-            return sum(1 << new[bit] for bit in bits_of(state & bits))
-
-        def change(operator: int) -> tuple[int, tuple[BitChange, ...]]:
-            precondition, changes = task.changes_of(operators[operator])
-            kept = (one for one in changes if not one[0] & missing)
-            return small(precondition), tuple((small(when), small(clear), small(set_)) for when, clear, set_ in kept)
-
-        needs, adds = [task.needs[r] for r in rows], [task.adds[r] for r in rows]
+        task, amounts = self.task, self.task.amounts
+        owners, _, adding = self.arrays
         place = {operator: i for i, operator in enumerate(operators)}
-        ways = derived.ways
-        part = replace(
-            task,
-            facts=(),
-            complements={},
-            size=len(new),
-            initial=small(state),
-            goal=small(wanted),
-            costs=[task.costs[operator] for operator in operators],
-            owners=[place[task.owners[r]] for r in rows] + [-1] * len(ways),
-            needs=Grouped.of(
-                [[new[bit] for bit in found if bit in new] for found in needs + [list(way) for way, _ in ways]]
-            ),
-            adds=Grouped.of([[new[bit] for bit in found if bit in new] for found in adds + [[bit] for _, bit in ways]]),
-            derived=derived.renamed(small),
-            change=change,
-            describe=lambda operator: task.describe(operators[operator]),
-            barred=set(),
-            whole=None,
-            _changes={},
-        )
-        return part, operators
-
-    def _part_with_amounts(self, amounts: Amounts, operators: Sequence[int], state: int, wanted: int) -> Task:
-        """Return the planning task of a window of steps; its states use the same bits as the states of the whole task.
-
-        In a state with amounts, the number of the tuple of amounts is stored above the bits of the whole task.
-        """
-        task, of = self.task, amounts.made
-        place = {operator: i for i, operator in enumerate(operators)}
-        rows = [*self._rows(operators), *self._conditional.get(-1, ())]
+        changing = union(clear | set_ for operator in operators for _, clear, set_ in task.changes_of(operator)[1])
+        changing |= amounts.compared if amounts is not None else 0
+        for part in task.derived.parts:
+            if changing & union(way for bit in part for way in bit.alternatives):
+                changing |= union(bit.mask for bit in part)
+        mine, changes = np.isin(owners, operators), self.flags(changing)
+        changes[task.adds.items[mine[adding]]] = True
+        possible = counts(self.flags(state) | changes, task.needs) == np.diff(task.needs.starts)
+        kept = (mine | (owners < 0)) & possible & (counts(changes, task.adds) > 0)
+        kept[: len(task)] = False
+        rows = [*operators, *np.flatnonzero(kept).tolist()]
+        if amounts is not None:
+            of = amounts.made
+            amounts = replace(amounts, moves=lambda operator: of(operators[operator]), _moves={}, _results={})
         return replace(
             task,
+            whole=task,
             initial=state,
             goal=wanted,
             costs=[task.costs[operator] for operator in operators],
@@ -481,18 +435,12 @@ class _Windows:
             change=lambda operator: task.changes_of(operators[operator]),
             describe=lambda operator: task.describe(operators[operator]),
             barred=set(),
-            amounts=replace(amounts, moves=lambda operator: of(operators[operator]), _moves={}, _results={}),
-            whole=task,
+            amounts=amounts,
             _changes={},
         )
 
-    def _rows(self, operators: Sequence[int]) -> list[int]:
-        """Return the relaxed operators that belong to the given operators and their conditional effects."""
-        return [*operators, *sorted(chain.from_iterable(self._conditional.get(operator, ()) for operator in operators))]
 
-    @cached_property
-    def _conditional(self) -> dict[int, list[int]]:
-        found: dict[int, list[int]] = {}
-        for r in range(len(self.task), len(self.task.owners)):
-            found.setdefault(self.task.owners[r], []).append(r)
-        return found
+def counts(flags: NDArray[np.bool_], lists: Grouped) -> Ints:
+    """Return, for each list of bits, the number of its bits whose flag is set."""
+    found: Ints = np.diff(np.concatenate([[0], np.cumsum(flags[lists.items])])[lists.starts])
+    return found

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from confab.planner.grounded.derived import in_parts
-from confab.planner.grounded.derived_arrays import Bit
+from confab.planner.grounded.derived_arrays import Bit, single, union
 from confab.planner.grounded.grounding import ground
 from confab.planner.grounded.task import Task
 from confab.planner.hierarchical.operators import Program
@@ -21,6 +21,7 @@ from confab.planner.solve import Request, solve
 from confab.planner.transitions import Table, key_of
 from confab.planner.validation import LoggedState
 from confab.reasoner.amounts import Quantity
+from confab.reasoner.closure import closure
 from confab.reasoner.graph.knowledge import load
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse
@@ -304,15 +305,18 @@ def test_derivation_with_arrays_and_with_counters_gives_the_same_facts(seed: int
 
 
 @given(seed=st.integers(0, 10**9))
-def test_derivation_can_be_limited_to_facts_that_given_changes_affect(seed: int) -> None:
-    rng = Random(seed)
-    bits = following(rng)
-    bits[18] = Bit(1 << 18, (1 << rng.randrange(6, 18),), opposite=True)
-    derived = in_parts(bits)
-    state = derived.completed(rng.randrange(1 << 6))
-    changing, wanted = rng.randrange(1 << 6), rng.randrange(1 << 19)
-    less = derived.within(state, changing, wanted)
-    for _ in range(10):
-        other = state ^ changing & rng.randrange(1 << 6)
-        assert less.completed(other) & wanted == derived.completed(other) & wanted
-    assert not derived.within(state, 0, wanted).parts
+def test_derived_bits_that_depend_on_each_other_form_a_part_which_comes_after_the_parts_that_it_needs(
+    seed: int,
+) -> None:
+    parts = [{bit.mask: union(bit.alternatives) for bit in part} for part in in_parts(following(Random(seed))).parts]
+    needs = {mask: set(single(needed)) for part in parts for mask, needed in part.items()}
+    below = {
+        mask: closure(its & needs.keys(), lambda other: needs[other] & needs.keys()) for mask, its in needs.items()
+    }
+    earlier = set[int]()
+    for part in parts:
+        earlier |= part.keys()
+        for mask in part:
+            assert below[mask] <= earlier
+            assert part.keys() - {mask} == {other for other in below[mask] if mask in below[other]} - {mask}
+    assert earlier == needs.keys()
