@@ -139,7 +139,7 @@ class RulePolicy:
         except OverspentError:
             steps = None
         if steps is not None and call.refiner.wrong_value(start, targets, keep) is None:
-            return steps if level == self.first else call.refiner.pruned(steps, start, targets, keep)
+            return steps
         allowance.wasted_expansions += space.expanded - expanded if level == self.first else 0
         allowance.wasted_effort = max(allowance.wasted_effort, wasted + space.effort + allowance.spent - began)
         call.table.undo(start)

@@ -20,13 +20,11 @@ from confab.planner.hierarchical.nogoods import Nogoods
 from confab.planner.hierarchical.scope import Scope
 from confab.planner.hierarchical.search_budget import BY_RULES, REFINING, SMALL, SearchBudget, scope_budgets
 from confab.planner.hierarchical.workspace import Ground, Keep, Workspace
-from confab.planner.transitions import Cell, Change, Changes
+from confab.planner.transitions import Cell, Change
 from confab.reasoner.amounts import meets
 from confab.reasoner.memory.experience import Method
 from confab.reasoner.symbols import FALSE
 
-LONG = 4
-"""Minimum number of steps of a replayed method for which superfluous steps are removed."""
 ATTEMPTS, FEW_ATTEMPTS = 40, 4
 """Maximum number of searches for steps with refinements: in general, and before all symbols have been brought to rest."""
 
@@ -88,9 +86,6 @@ class Refiner:
         self.methods = Methods(space, methods)
         self.nogoods = Nogoods(space)
         self.hits = self.misses = 0
-        changed = frozenset[str]().union(*(b.changes for b in space.program.domain.behaviors.values()))
-        situations = space.program.domain.situations.values()
-        self.drifting = any(s.level > self.levels[0] and s.rest is None and s.name in changed for s in situations)
         self.refinements: dict[object, tuple[RefinedStep, ...]] = {}
         """The known refinements; a refinement is replayed if the same step is refined in the same state."""
         self.careful = False
@@ -268,42 +263,7 @@ class Refiner:
         if len(steps) < len(method.steps) or self.wrong_value(mark, targets, keep) is not None:
             self.table.undo(mark)
             return None
-        if method.open and (self.drifting or len(steps) >= LONG):
-            return self.pruned(steps, mark, targets, keep)
         return steps
-
-    def pruned(self, steps: list[RefinedStep], mark: int, targets: Mapping[Cell, str], keep: Keep) -> list[RefinedStep]:
-        """Return the steps applied since a marked state, without superfluous steps.
-
-        Superfluous steps are single steps, or pairs of steps that undo each other.
-        """
-        for dropped in self._idle(steps, mark, keep):
-            rest = [step for i, step in enumerate(steps) if i not in dropped]
-            if self._replayed(rest, mark) and self.wrong_value(mark, targets, keep) is None:
-                return self.pruned(rest, mark, targets, keep)
-        self._replayed(steps, mark)
-        return steps
-
-    def _replayed(self, steps: Sequence[RefinedStep], mark: int) -> bool:
-        """Replace the steps applied since a marked state by other steps; return whether all of these steps are applicable."""
-        self.table.undo(mark)
-        return all(self.replay_checked(step) is not None for step in steps)
-
-    def _idle(self, steps: Sequence[RefinedStep], mark: int, keep: Keep) -> list[set[int]]:
-        """Return sets of positions of possibly superfluous steps.
-
-        A set contains a single step that changes only symbols with arbitrary final values, or two steps that cancel out.
-        """
-        self.table.undo(mark)
-        changes: list[Changes] = []
-        for step in steps:
-            begin = len(self.table.trail)
-            self.replay_checked(step)
-            changes.append(self.table.changes(begin))
-        alone = [
-            {i} for i, (old, _) in enumerate(changes) if all(keep(cell, value) is None for cell, value in old.items())
-        ]
-        return alone + [{i, j} for j, (old, new) in enumerate(changes) for i in range(j) if changes[i] == (new, old)]
 
     def replay_checked(self, step: RefinedStep) -> RefinedStep | None:
         """Apply a step with the same sub-steps, and return the step with its current bindings.

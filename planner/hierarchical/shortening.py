@@ -108,7 +108,10 @@ def shorten_once(call: Call, work: int, leave_levels: bool, advised: Callable[[C
 
 def costs_depend(call: Call) -> bool:
     """Return whether the cost of a refinement may depend on earlier steps, or on a choice of primitives with different costs."""
-    return call.refiner.drifting or prices(call) > 1
+    first, domain = call.program.levels[0], call.problem.domain
+    changed = frozenset[str]().union(*(behavior.changes for behavior in domain.behaviors.values()))
+    free = (s for s in domain.situations.values() if s.level > first and s.rest is None)
+    return prices(call) > 1 or any(situation.name in changed for situation in free)
 
 
 def prices(call: Call) -> int:
