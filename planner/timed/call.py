@@ -37,8 +37,8 @@ from confab.reasoner.timing import judged_by_events
 
 MOST_PLACES = 50
 """Maximum number of steps before which an external event that a plan doesn't need is tried, after the first place."""
-KEPT = 0.25
-"""The share of the remaining time that sharing the goals among actors leaves for scheduling the resulting steps."""
+AGAIN, KEPT = 0.6, 0.25
+"""The shares of the remaining time that remain after sharing the goals of the given plan, and of the best schedule so far."""
 
 
 @dataclass(frozen=True)
@@ -101,14 +101,20 @@ def best_in_time(
             bound = of_any_plan(problem)
     if shorten or found.plan is None:
         found = _spread(problem, plan, found, left(0.33), separation)
-    if not enough(found):
-        end = None if until is None else until - KEPT * (until - perf_counter())
-        other = shared(problem, plan, end, shorten, bound)
+    given = plan
+    for kept in (AGAIN, KEPT) if shorten else (KEPT,):
+        if enough(found):
+            break
+        end = None if until is None else until - kept * (until - perf_counter())
+        other = shared(problem, given, end, shorten, bound)
         if other is not None:
             with suppress(LimitError):
                 found = _better(problem, found, in_time(problem, other, left(0.5 if shorten else 1.0), separation))
             if shorten or found.plan is None:
-                found = _spread(problem, other, found, left(1.0), separation)
+                found = _spread(problem, other, found, left(1.0 if kept == KEPT else 0.5), separation)
+        if found.plan is None or found.plan.plan == other:
+            break  # sharing the goals of its own result changes nothing
+        given = found.plan.plan
     if found.plan is None or not shorten:
         return found
     return replace(found, plan=replace(found.plan, least=bound, bound=max(found.plan.bound, bound)))
