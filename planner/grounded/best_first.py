@@ -5,7 +5,8 @@ levels if hierarchical planning fails.
 
 Two search orders take turns in one loop (`confab.planner.grounded.exploring`). The first order uses the heuristic h_FF, preferred
 operators and lookahead, and is directed to the goals (`confab.planner.grounded.greedy`). The second order uses novelty, is fast,
-and escapes plateaus of the heuristic (`confab.planner.grounded.novelty`). The plan is shortened afterwards
+and escapes plateaus of the heuristic (`confab.planner.grounded.novelty`). Goals that have to be achieved before others are
+preconditions in both orders (`confab.planner.grounded.goal_order`). The plan is shortened afterwards
 (`confab.planner.grounded.plan_windows`).
 """
 
@@ -18,6 +19,7 @@ from dataclasses import dataclass, field, replace
 from time import perf_counter
 
 from confab.planner.grounded.exploring import SearchOrder, explore, path_to
+from confab.planner.grounded.goal_order import ordered
 from confab.planner.grounded.greedy import Greedy
 from confab.planner.grounded.grounding import MOST_ROWS, ground
 from confab.planner.grounded.hff import heuristic
@@ -170,6 +172,7 @@ class Search:
         """Search; yield the work of each turn of a search order, and return the result."""
         if task.initial & task.goal == task.goal:
             return self._ended(Status.SOLVED)
+        task = ordered(task, self.deadline)
         evaluate = heuristic(task)
         begun = evaluate(task.initial)
         if begun is None:
