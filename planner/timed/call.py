@@ -37,7 +37,7 @@ from confab.reasoner.timing import judged_by_events
 
 MOST_PLACES = 50
 """Maximum number of steps before which an external event that a plan doesn't need is tried, after the first place."""
-AGAIN, KEPT = 0.6, 0.25
+AGAIN, KEPT = 0.2, 0.1
 """The shares of the remaining time that remain after sharing the goals of the given plan, and of the best schedule so far."""
 
 
@@ -76,7 +76,8 @@ def best_in_time(
     separation : Fraction
         The minimum time between conflicting events, in seconds (epsilon in PDDL).
     """
-    from confab.planner.timed.sharing import evenly_shared, shared
+    from confab.planner.timed.crews import evenly_shared
+    from confab.planner.timed.sharing import shared
 
     until = None if seconds is None else perf_counter() + seconds
 

@@ -1,24 +1,25 @@
 """Sharing of the work among actors: the goals are planned again, in another order and with other actors, for a better schedule.
 
-A crew restricts the actors and the steps towards a goal: it contains a chosen individual for each class of actors, barred actors,
-and barred steps. The chosen individual takes part in each step with actors of its class. The empty crew allows all actors and
-steps. A task is a goal, or a step to be executed early, with a crew. A stretch consists of the steps that achieve a task from a
-state. The default planner finds the steps of a stretch. All goals that were achieved before still hold after a stretch.
+A task is a goal, or a step to be executed early, with a crew (`confab.planner.timed.crews`). A stretch consists of the steps that
+achieve a task from a state. The default planner finds the steps of a stretch. All goals that were achieved before still hold after
+a stretch.
 
 The first sequence of tasks follows the plan, or assigns each goal greedily to the crew that achieves the goal first. Then the
 search makes one change at a time, preferably to a task on the critical path. A change concerns the crew or the position of a
-task. The first sequence and the best sequence are also improved by takeovers (`confab.planner.timed.takeovers`): an actor takes
-over single parts of the steps of another actor, whichever goal the steps serve. Takeovers need no planning, so a late sequence
-of the plan is improved by takeovers before the greedy sequence is built. If the makespan is minimised with a time limit, the
-search goes on from the best sequence after a few changes, whatever they cost. The search ends if the schedule reaches a lower
-bound, if all actors are busy for the whole makespan, or after many changes without a better schedule. Without a time limit, the
-work is bounded, too, so that the result is the same on every machine.
+task. The search keeps a change that shortens neither the makespan nor the lateness with a certain probability, even if the actors'
+work becomes less even. The first sequence and the best sequence are also improved by takeovers
+(`confab.planner.timed.takeovers`): an actor takes over single parts of the steps of another actor, whichever goal the steps serve.
+Takeovers need no planning, so a late sequence of the plan is improved by takeovers before the greedy sequence is built. If the
+makespan is minimised with a time limit, the search goes on in rounds: from the best sequence after a few changes, whatever they
+cost, or, after a round without a better schedule, from the greedy sequence of another order of the goals. The search ends if the
+schedule reaches a lower bound, if all actors are busy for the whole makespan, or after many changes without a better schedule.
+Without a time limit, the work is bounded, too, so that the result is the same on every machine.
 """
 
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -33,17 +34,15 @@ from confab.planner.hierarchical.agenda import Agenda
 from confab.planner.hierarchical.call import Call, Compiled, compiled
 from confab.planner.plan import Plan, Step, UnsolvableError, renumbered
 from confab.planner.timed.activities import Activity, InapplicableError, activities, in_sequence
-from confab.planner.timed.listing import combinations
+from confab.planner.timed.crews import Crew, Ground, crews_of, evenly_shared, every_actor, with_crew
 from confab.planner.timed.network import earliest, network_of
 from confab.planner.timed.order import order_of
-from confab.planner.timed.pieces import default_actors
 from confab.planner.timed.schedules import turn_edges
 from confab.planner.timed.takeovers import SharedSteps, Takeover, with_bindings
 from confab.planner.validation import BehaviorReader, LoggedState, validate
 from confab.reasoner.limits import LimitError, check
 from confab.reasoner.problem import Problem
-from confab.reasoner.symbols import AnyOf, Behavior, Condition, EqualityCondition, Symbol, ValueCondition
-from confab.reasoner.timing import timing_of
+from confab.reasoner.symbols import Symbol, ValueCondition
 
 MOST_CREWS = 64
 """Maximum number of crews."""
@@ -56,9 +55,7 @@ BARREN, MOST_BARREN = 10, 150
 
 A late schedule is changed up to the second number.
 """
-BUSY = Fraction(103, 100)
-"""A schedule isn't improved further if the makespan times the number of actors is at most this number times the actors' work."""
-DISTURBING, BARREN_ROUNDS = 4, 6
+DISTURBING, BARREN_ROUNDS = 4, 20
 """Number of changes that begin a further round, whatever they cost, and maximum number of further rounds without a better schedule.
 
 Further rounds follow only if the schedule is late, or if the makespan is minimised with a time limit. Each round begins with the
@@ -73,7 +70,8 @@ MOST_COMPILED = 200
 HALF, PREFERRED, EARLY = 0.5, 0.8, 0.25
 """Probabilities of kinds of changes.
 
-`HALF` is the probability that an actor is barred instead of a step, and that a step is barred instead of its behaviour. `PREFERRED`
+`HALF` is the probability that an actor is barred instead of a step, that a step is barred instead of its behaviour, and that a
+change is kept that only makes the work less even. `PREFERRED`
 is the probability that a change concerns a task on the critical path. `EARLY` is the probability that a late step becomes an early
 task.
 """
@@ -83,23 +81,9 @@ EXPANSIONS, WORK = 500, 200_000
 """Maximum number of expansions for a stretch, and maximum work of its searches; the unit is one operator in one state."""
 
 State: TypeAlias = "dict[Symbol, str]"
-Ground: TypeAlias = "tuple[str, tuple[str, ...]]"
-"""A behaviour with its arguments."""
 Aim: TypeAlias = "Symbol | Ground"
 """The aim of a task: a goal, or a step of the first level that is executed early."""
 SharedTask: TypeAlias = "tuple[Aim, Crew]"
-
-
-@dataclass(frozen=True)
-class Crew:
-    """A crew: a chosen individual for each class of actors, the barred actors `without`, and the barred steps.
-
-    A barred step is a behaviour with its arguments; no arguments bar all steps of the behaviour.
-    """
-
-    chosen: tuple[tuple[str, str], ...] = ()
-    without: frozenset[str] = frozenset()
-    barred: frozenset[Ground] = frozenset()
 
 
 @dataclass
@@ -124,6 +108,8 @@ class _Sequence:
     """The sum of the times during which the actors are busy."""
     end: Fraction
     """The end of the last stretch."""
+    ends: dict[str, Fraction]
+    """The end of the last step that names an individual, by individual."""
     critical: list[tuple[int, Step, tuple[str, ...], Ground]]
     """The steps on the critical path, or on the path to the activity with the greatest lateness.
 
@@ -161,77 +147,6 @@ def shared(
     if best is None:
         return None
     return Plan(with_bindings(LoggedState(problem, problem.initial, search.rules), _steps_of(best.stretches)))
-
-
-def crews_of(problem: Problem) -> Iterator[Crew]:
-    """Yield the crews of a problem; the first crew allows all individuals.
-
-    No individual is chosen for a class that contains another class of actors, such as machines for washers and dryers.
-    """
-    resting = default_actors(problem)
-    kinds = dict.fromkeys(
-        behavior.kinds[term]
-        for behavior in problem.domain.behaviors.values()
-        for term in _actor_terms(problem, behavior, resting)
-    )
-    classes = {kind: problem.classes.get(kind, ()) for kind in kinds}
-    general = {
-        kind for kind, its in classes.items() if any(set(other) < set(its) for other in classes.values() if other)
-    }
-    several = {kind: its for kind, its in classes.items() if len(its) > 1 and kind not in general}
-    yield Crew()
-    for its in combinations(list(several.values())) if several else ():
-        yield Crew(tuple(zip(several, its, strict=True)))
-
-
-def evenly_shared(problem: Problem, work: Fraction, makespan: Fraction) -> bool:
-    """Return whether all actors of a problem are busy for almost the whole makespan of a plan.
-
-    `work` is the sum of the times during which the actors are busy.
-    """
-    actors = every_actor(problem)
-    return bool(actors) and makespan * len(actors) <= work * BUSY
-
-
-def every_actor(problem: Problem) -> list[str]:
-    """Return the individuals that may be actors of a behaviour."""
-    resting, actors = default_actors(problem), set[str]()
-    for behavior in problem.domain.behaviors.values():
-        actors.update(term for term in timing_of(behavior).actors if term not in behavior.kinds)
-        for term in _actor_terms(problem, behavior, resting):
-            actors.update(problem.members(behavior.kinds[term]))
-    return sorted(actors)
-
-
-def _actor_terms(problem: Problem, behavior: Behavior, resting: frozenset[str]) -> tuple[str, ...]:
-    """Return those parameters and variables of a behaviour that denote actors."""
-    stated = timing_of(behavior).actors
-    if stated:
-        return tuple(term for term in stated if term in behavior.kinds)
-    its = (p.name for p in behavior.parameters if not resting.isdisjoint(problem.classes.get(p.kind, ())))
-    return tuple(islice(its, 1))
-
-
-def with_crew(problem: Problem, crew: Crew) -> Problem:
-    """Return a problem in which only the actors and the steps that a crew allows are possible."""
-    lowest, resting, chosen = problem.domain.levels[-1], default_actors(problem), dict(crew.chosen)
-
-    def asked(behavior: Behavior) -> Behavior:
-        acting = _actor_terms(problem, behavior, resting) if behavior.level == lowest else tuple(behavior.kinds)
-        own: list[Condition] = [EqualityCondition(t, one, negated=True) for t in acting for one in sorted(crew.without)]
-        for kind in sorted({behavior.kinds[t] for t in acting} & chosen.keys()):
-            takes_part = [EqualityCondition(t, chosen[kind]) for t in acting if behavior.kinds[t] == kind]
-            own += takes_part if len(takes_part) == 1 else [AnyOf(tuple((one,) for one in takes_part))]
-        barred = tuple(
-            tuple(EqualityCondition(p.name, a) for p, a in zip(behavior.parameters, arguments, strict=bool(arguments)))
-            for name, arguments in sorted(crew.barred)
-            if name == behavior.name
-        )
-        others = [AnyOf(barred, negated=True)] if barred else []
-        return replace(behavior, preconditions=(*behavior.preconditions, *own, *others))
-
-    behaviors = {name: asked(behavior) for name, behavior in problem.domain.behaviors.items()}
-    return replace(problem, domain=replace(problem.domain, behaviors=behaviors))
 
 
 @dataclass
@@ -298,22 +213,18 @@ class _SharingSearch:
         """Build the sequence of the plan and the greedy sequence, and improve the better sequence by changes."""
         own, until = self.own(), self.until
         self.best, starts, late = own, [] if own is None else [own], own is not None and own.cost[0] > 0
-        if until is not None and own is not None:
-            self.until = (perf_counter() + until) / 2
         if own is not None and late:
+            self.until = self.half_time()
             self.limit(MOST_WORK // 4)
             with suppress(LimitError):
                 self.eased(own)
-        if self.best is not None and self.best.cost[0]:
-            self.until = until
-        self.limit(MOST_WORK // 2)
+        self.until = until
+        self.limit(inf if self.shorten and until is not None else MOST_WORK)
         for start in starts if not any(step.joined for step in self.plan.steps) else ():
             self.remember(start)  # no single goal needs all steps of a joint refinement
         with suppress(LimitError):
-            greedy = self.greedy()
+            greedy = self.greedy(self.goals, until if self.best is not None and self.best.cost[0] else self.half_time())
             starts += [] if greedy is None else [greedy]
-        self.until = until
-        self.limit(inf if self.shorten and self.until is not None else MOST_WORK)
         if not starts:
             return
         now, random, barren = min(starts, key=lambda one: one.cost), Random(0), 0
@@ -328,7 +239,8 @@ class _SharingSearch:
             if not self.best.cost[0] and (not self.shorten or self.until is None):
                 break
             cost = self.best.cost
-            self.improve(self.disturbed(self.best, random), random)
+            other = self.in_other_order(random) if barren % 2 else self.disturbed(self.best, random)
+            self.improve(other or self.best, random)
             self.eased(self.best)
             barren = 0 if self.best.cost < cost else barren + 1
 
@@ -395,7 +307,7 @@ class _SharingSearch:
             self.spend(0)
             other = self.built(self.changed(now, random), now)
             changes += 1
-            if other is None or other.cost > now.cost:
+            if other is None or other.cost[:2] > now.cost[:2] or (other.cost > now.cost and random.random() < HALF):
                 continue
             better = changes if other.cost < now.cost else better
             now = other
@@ -427,18 +339,35 @@ class _SharingSearch:
             stretches.append(_Stretch(steps, before, state))
         return self.scheduled([(goal, Crew()) for goal in goals], stretches) if goals else None
 
-    def greedy(self) -> _Sequence | None:
+    def half_time(self) -> float | None:
+        """Return the end of the first half of the remaining time, or None without a time limit."""
+        return None if self.until is None else (perf_counter() + self.until) / 2
+
+    def in_other_order(self, random: Random) -> _Sequence | None:
+        """Return the greedy sequence for the goals in a random order; goals with deadlines come first, sorted by deadline."""
+        deadlines = self.problem.times.deadlines if self.problem.times else {}
+        goals = random.sample(self.goals, len(self.goals))
+        return self.greedy(
+            sorted(goals, key=lambda goal: (goal not in deadlines, deadlines.get(goal, 0))), self.half_time()
+        )
+
+    def greedy(self, goals: Sequence[Symbol], until: float | None) -> _Sequence | None:
         """Return the greedy sequence of tasks: each goal is assigned to the crew that achieves the goal first.
 
-        If no crew achieves a goal, the goal is tried again after the next goal. Return None if no crew achieves a remaining goal.
+        For each goal, as many crews are tried as its share of the time until `until` allows, or without a time limit its share of
+        half of the work. If no crew achieves a goal, the goal is tried again after the next goal. Return None if no crew achieves a
+        remaining goal.
         """
         now: _Sequence | None = None
-        waiting = list(self.goals)
+        waiting = list(goals)
         while waiting:
             tasks = [] if now is None else now.tasks
             found: list[_Sequence] = []
             for goal in waiting:
-                found = self.by_each_crew(tasks, goal, now)
+                work, end = self.work + (MOST_WORK // 2 - self.work) / len(waiting), inf
+                if until is not None:
+                    work, end = inf, perf_counter() + (until - perf_counter()) / len(waiting)
+                found = self.by_each_crew(tasks, goal, now, work, end)
                 if found:
                     waiting.remove(goal)
                     break
@@ -447,11 +376,23 @@ class _SharingSearch:
             now = min(found, key=lambda one: (one.cost[0], one.end, *one.cost[1:]))
         return now
 
-    def by_each_crew(self, tasks: Sequence[SharedTask], goal: Symbol, like: _Sequence | None) -> list[_Sequence]:
-        """Return sequences of tasks with a further goal for each crew that achieves it; at a limit, those found before it."""
+    def by_each_crew(
+        self, tasks: Sequence[SharedTask], goal: Symbol, like: _Sequence | None, work: float, until: float
+    ) -> list[_Sequence]:
+        """Return sequences of tasks with a further goal for each crew that achieves it.
+
+        Crews whose individuals have been free for longer come first. When the work is `work`, or at the time `until`, no further
+        crew is tried if a sequence was found.
+        """
+        ends = {} if like is None else like.ends
+        crews = sorted(
+            self.crews, key=lambda crew: max((ends.get(one, Fraction(0)) for _, one in crew.chosen), default=-1)
+        )
         found = list[_Sequence]()
         try:
-            for crew in self.crews:
+            for crew in crews:
+                if found and (self.work > work or perf_counter() > until):
+                    break
                 if (one := self.built([*tasks, (goal, crew)], like)) is not None:
                     found.append(one)
         except LimitError:
@@ -636,7 +577,9 @@ class _SharingSearch:
         if begins is None:
             return None
         if not steps:
-            return _Sequence(tasks, stretches, (Fraction(0), Fraction(0), Fraction(0)), Fraction(0), Fraction(0), [])
+            return _Sequence(
+                tasks, stretches, (Fraction(0), Fraction(0), Fraction(0)), Fraction(0), Fraction(0), {}, []
+            )
         of = [k for k, one in enumerate(stretches) for _ in Plan(one.steps).primitives]
         ends = [begin + lasts for begin, lasts in zip(begins.begins, network.durations, strict=True)]
         critical, at = list[tuple[int, Step, tuple[str, ...], Ground]](), begins.latest
@@ -649,10 +592,16 @@ class _SharingSearch:
             critical.append((of[at], steps[at], order.activities[at].actors, (above.behavior, above.arguments)))
             at = begins.waits_for[at]
         work: dict[str, Fraction] = defaultdict(Fraction)
+        acting = set(self.actors)
         for one in order.activities:
-            for actor in one.actors:
+            for actor in one.actors or acting.intersection(one.step.arguments):
                 work[actor] += one.duration
+        last: dict[str, Fraction] = defaultdict(Fraction)
+        for step, when in zip(steps, ends, strict=True):
+            for argument in step.arguments:
+                last[argument] = max(last[argument], when * network.unit)
         late, makespan = (cost * network.unit for cost in begins.cost)
         end = max((end for end, k in zip(ends, of, strict=True) if k == len(tasks) - 1), default=0) * network.unit
         cost = late, makespan, sum((its**2 for its in work.values()), Fraction(0))
-        return _Sequence(tasks, stretches, cost, sum(work.values(), Fraction(0)), end, critical)
+        busy = sum((one.duration * len(one.actors) for one in order.activities), Fraction(0))
+        return _Sequence(tasks, stretches, cost, busy, end, last, critical)

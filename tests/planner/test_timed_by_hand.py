@@ -16,12 +16,12 @@ from confab.planner.solve import Request, solve
 from confab.planner.timed import call, concurrent
 from confab.planner.timed.activities import Access, Activity
 from confab.planner.timed.call import Timed, best_in_time, in_time
+from confab.planner.timed.crews import Crew, crews_of, with_crew
 from confab.planner.timed.exchange import choices_of
 from confab.planner.timed.network import earliest, network_of
 from confab.planner.timed.order import BEGIN, END, Order, Resource, Turn, TurnId, order_in_sequence
 from confab.planner.timed.plan import Slot, TimedPlan
 from confab.planner.timed.schedules import ActorChoices, CandidateSchedule, _ScheduleSearch, turn_edges
-from confab.planner.timed.sharing import Crew, crews_of, with_crew
 from confab.planner.timed.validation import validate_timed
 from confab.planner.validation import Fault
 from confab.reasoner.amounts import Amount, Quantity

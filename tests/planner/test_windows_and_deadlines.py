@@ -18,8 +18,8 @@ from confab.cli import app
 from confab.planner.hierarchical.call import Compiled, compiled
 from confab.planner.plan import Limits, Outcome, Plan, Status
 from confab.planner.solve import Mode, Request, solve
+from confab.planner.timed.crews import crews_of
 from confab.planner.timed.plan import TimedPlan
-from confab.planner.timed.sharing import crews_of
 from confab.planning import Result
 from confab.reasoner.limits import OutOfTimeError
 from confab.reasoner.pddl.importing import imported
