@@ -22,8 +22,8 @@ from time import perf_counter
 from confab.planner.grounded.derived_arrays import union
 from confab.planner.grounded.task import BitChange, Grouped, Task, bits_of
 
-MOST_WORK = 2_000_000
-"""Maximum work of the computation of pairs: examined bits of operators, and found pairs."""
+MOST_WORK, ROUNDS = 2_000_000, 10
+"""Maximum work of the computation of pairs: examined bits of operators, and found pairs; and the expected number of rounds."""
 LOOK = 1_000
 """Number of operators between two readings of the clock."""
 
@@ -34,8 +34,12 @@ def ordered(task: Task, deadline: float | None = None) -> Task:
     If the computation takes too much work, or the deadline (on the clock of `time.perf_counter`) has passed, return the same task.
     """
     goals = task.goal & ~task.initial & _plain(task)
+    if goals.bit_count() < 2 or ROUNDS * len(task.needs.items) > MOST_WORK:
+        return task
     for operator in range(len(task)):
-        for _, cleared, _ in task.changes_of(operator)[1]:
+        if operator % LOOK == 0 and deadline is not None and perf_counter() > deadline:
+            return task
+        for _, cleared, _ in task.changes_of(operator)[1] if goals else ():
             goals &= ~cleared
     if goals.bit_count() < 2:
         return task
