@@ -11,7 +11,9 @@ from __future__ import annotations
 import logging
 import re
 import warnings
+from collections.abc import Iterator
 from dataclasses import replace
+from fractions import Fraction
 from importlib.util import find_spec
 from pathlib import Path
 from pkgutil import iter_modules
@@ -23,6 +25,9 @@ from typing import TYPE_CHECKING, Any
 from confab.planner.hierarchical.regrouping import under_the_levels_above
 from confab.planner.levels import levels_left
 from confab.planner.plan import Outcome, Plan, Reason, Status
+from confab.planner.timed.call import Timed, in_time
+from confab.planner.timed.pieces import default_actors
+from confab.planner.timed.plan import TimedOutcome
 from confab.planner.validation import validate
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import Deadline, overtime, within
@@ -58,7 +63,9 @@ KNOWN = {
 }
 """The package that provides each engine, by the engine's name in unified-planning."""
 Answer = tuple[str, str, list[str]]
-"""The name of an engine, the status of its result in unified-planning, and the steps of its plan as ``action object …``."""
+"""The name of an engine, the status of its result in unified-planning, and the lines of its plan in the competition format."""
+LINE = re.compile(r"^(?:[\d.]+\s*:\s*)?\([^()]*\)(?:\s*\[[\d.]+\])?", re.MULTILINE)
+"""A line of a plan file: ``(action object …)``, or ``begin: (action object …) [duration]`` in a plan with times."""
 
 
 def plan_by_engine(
@@ -114,13 +121,72 @@ def _planned(problem: Problem, engine: str | None, level: int | None, deadline: 
         return outcome(Status.GAVE_UP, reason=said.lower().replace("_", " "))
     from confab.pddl_commands import read_pddl_plan
 
-    found = read_pddl_plan(wanted, level, "".join(f"({line})\n" for line in lines), regroup=True, shorten=True)
+    found = read_pddl_plan(wanted, level, "\n".join(lines), regroup=True, shorten=True)
     for plan in (under_the_levels_above(problem, found), found):
         with overtime():
             faults = validate(problem, plan)
         if not faults:
             return outcome(Status.SOLVED, plan)
     return outcome(Status.GAVE_UP, reason=f"its plan is invalid: {faults[0].text}")
+
+
+def plans_in_time(engine: str | None) -> bool:
+    """Return whether an installed engine plans durative actions."""
+    if engine is None or find_spec("unified_planning") is None:
+        return False
+    from unified_planning.environment import Environment
+
+    factory = Environment().factory
+    return engine in factory.engines and "CONTINUOUS_TIME" in factory.engine(engine).supported_kind().features
+
+
+def plan_in_time_by_engine(problem: Problem, engine: str, seconds: float | None = None) -> Outcome:
+    """Plan the lowest level of a problem with times with an engine that plans durative actions.
+
+    Parameters
+    ----------
+    problem : Problem
+    engine : str
+        The engine's name in unified-planning, e.g. ``lpg``.
+    seconds : float, optional
+        Time limit of the whole call; by default `ENGINE_SECONDS`.
+
+    Returns
+    -------
+    Outcome
+        A `TimedOutcome` with a timed plan that the checker accepts, or the outcome "gave up": that an engine finds no plan proves
+        nothing.
+
+    Raises
+    ------
+    KnowledgeError
+        PDDL can't express the problem, or the engine can't read it.
+    """
+    with within(ENGINE_SECONDS if seconds is None else seconds) as deadline:
+        began = perf_counter()
+        wanted = replace(problem, goal={**at_rest(problem, problem.domain.levels[-1]), **problem.goal})
+        exported = to_pddl(wanted, workers=default_actors(problem))
+        name, said, lines = answer(exported.domain, exported.problem, engine, deadline)
+        if not said.startswith("SOLVED"):
+            return Outcome(
+                Status.GAVE_UP,
+                reason=Reason(f"{name}: {said.lower().replace('_', ' ')}"),
+                seconds=perf_counter() - began,
+            )
+        from confab.pddl_commands import read_timed_plan
+
+        with overtime():
+            found = read_timed_plan(wanted, exported, "\n".join(lines))
+            if found.plan is not None:  # other orders of the same steps may take less
+                other = in_time(wanted, found.plan.plan, deadline.left)
+                shorter = other.plan is not None and other.plan.makespan <= found.plan.makespan
+                found = other if shorter else Timed(replace(found.plan, bound=Fraction(0)))
+        spent = perf_counter() - began
+        if found.plan is None:
+            why = found.reason.text if found.reason else "it has no schedule"
+            return Outcome(Status.GAVE_UP, reason=Reason(f"{name}: its plan is invalid: {why}"), seconds=spent)
+        left = tuple(levels_left(problem, found.plan.plan))
+        return TimedOutcome(Status.SOLVED, found.plan.plan, seconds=spent, engine=name, left=left, timed=found.plan)
 
 
 def unified(domain: str, problem: str) -> unified_planning.model.Problem:
@@ -243,9 +309,26 @@ def solved(domain: str, problem: str, engine: str | None, seconds: float | None)
                 name = engine or planner.name
         except UPException as error:
             raise KnowledgeError(f"no engine takes this problem: {' '.join(str(error).split())}") from None
-    actions = result.plan.actions if result.plan is not None else ()
-    lines = [" ".join((action.action.name, *map(str, action.actual_parameters))) for action in actions]
+        except Exception as error:  # engines have errors of their own
+            said = " ".join(str(error).split())[:200]
+            raise KnowledgeError(
+                f"{engine or 'the engine'} ends with an error: {type(error).__name__}: {said}"
+            ) from None
+    lines = [] if result.plan is None else list(_lines(result.plan))
     return name, "SOLVED_SATISFICING" if lines else result.status.name, lines
+
+
+def _lines(plan: Any) -> Iterator[str]:
+    """Yield the lines of a plan of unified-planning, which is a sequence of actions, or actions with begins and durations."""
+
+    def line(action: Any) -> str:
+        return f"({' '.join((action.action.name, *map(str, action.actual_parameters)))})"
+
+    if hasattr(plan, "timed_actions"):
+        for begin, action, lasts in plan.timed_actions:
+            yield f"{float(begin):.6f}: {line(action)} [{float(lasts or 0):.6f}]"
+    else:
+        yield from map(line, plan.actions)
 
 
 def _tell(engine: str, deadline: Deadline) -> None:
@@ -281,5 +364,5 @@ def _directly(planner: Any, domain: str, problem: str, deadline: Deadline) -> tu
         for file in sorted(written, key=lambda file: file.stat().st_mtime_ns, reverse=True):
             text = file.read_text()
             if code is not None or text.endswith("\n"):  # without it, the engine was still writing the file
-                return "SOLVED_SATISFICING", re.findall(r"^\(([^()]*)\)", text, re.MULTILINE)
+                return "SOLVED_SATISFICING", LINE.findall(text)
         return "TIMEOUT" if code is None else planner._result_status(Nothing(), None, code, []).name, []

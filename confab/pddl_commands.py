@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from contextlib import suppress
+from fractions import Fraction
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TypeAlias
@@ -13,11 +15,14 @@ from confab.planner.grounded.plan_windows import regrouped, without_superfluous_
 from confab.planner.grounded.task import Task
 from confab.planner.paper.transitions import Model, Values
 from confab.planner.plan import Plan, Step, UngroundableError
+from confab.planner.timed.activities import EventKind
+from confab.planner.timed.call import Timed, in_time
+from confab.planner.timed.pieces import default_actors
 from confab.reasoner.files import check_replaceable, made_folder, write_whole
 from confab.reasoner.graph.knowledge import KnowledgeError, load
 from confab.reasoner.kinds import DOMAIN, IMPORTED, PROBLEM, stamped
 from confab.reasoner.limits import OutOfTimeError
-from confab.reasoner.pddl.exporting import Exported, plan_of, to_pddl
+from confab.reasoner.pddl.exporting import Exported, PlanLine, plan_of, to_pddl
 from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse_files
 from confab.reasoner.pddl.turtle import turtle
@@ -25,6 +30,7 @@ from confab.reasoner.pddl.words import PddlError
 from confab.reasoner.problem import Problem
 from confab.reasoner.reading.problem import read
 from confab.reasoner.symbols import GroundBehavior
+from confab.timing import has_times
 
 Ground: TypeAlias = tuple[str, tuple[str, ...]]
 """The name of a behaviour, and its arguments."""
@@ -82,7 +88,7 @@ def _check_scene(text: str) -> None:
 
 
 def exported(problem: Problem, level: int | None) -> Exported:
-    """Return a level of a problem in PDDL, by default the lowest level.
+    """Return a level of a problem in PDDL, by default the lowest level; the lowest level of a problem with times has times.
 
     Raises
     ------
@@ -97,7 +103,21 @@ def exported(problem: Problem, level: int | None) -> Exported:
     if level is not None and level not in levels:
         files = "" if isinstance(level, int) else "; scene.export(FOLDER) writes files"
         raise KnowledgeError(f"no level {level}; this scene has {', '.join(map(str, levels))}{files}")
-    return to_pddl(problem, level)
+    timed = has_times(problem) and level in (None, levels[-1])
+    return to_pddl(problem, level, default_actors(problem) if timed else None)
+
+
+def omitted_times(problem: Problem, level: int | None) -> str:
+    """Return which times an export lacks, as a sentence, or an empty text if it lacks none."""
+    if not has_times(problem):
+        return ""
+    if level not in (None, problem.domain.levels[-1]):
+        return "the PDDL of an upper level has no durations, deadlines or windows of availability"
+    lacking = ["deadlines"] * bool(problem.times and problem.times.deadlines)
+    events = problem.times.events if problem.times else {}
+    actions = [one for one in problem.domain.at_level(problem.domain.levels[-1]) if one.name not in events]
+    lacking += ["costs"] * any(one.price is not None or one.cost != 1 for one in actions)
+    return f"the PDDL has no {' and no '.join(lacking)}; its metric is the time" if lacking else ""
 
 
 def export_pddl(problem: Problem, level: int | None, folder: Path) -> tuple[Path, Path]:
@@ -136,12 +156,63 @@ def read_pddl_plan(
         A line of the text isn't an action of the exported level.
     """
     level = problem.domain.levels[-1] if level is None else level
-    try:
-        found = plan_of(to_pddl(problem, level), text)
-    except ValueError as error:
-        raise KnowledgeError(str(error)) from error
+    timed = has_times(problem) and level == problem.domain.levels[-1] and "[" in text
+    export = to_pddl(problem, level, default_actors(problem) if timed else None)
+    found = [(line.behavior, line.arguments) for line in _lines(export, text)]
     if regroup or shorten:
         found = _regrouped(problem, level, found, shorten)
+    return Plan(_steps(problem, level, found))
+
+
+def read_timed_plan(problem: Problem, exported: Exported, text: str, seconds: float | None = None) -> Timed:
+    """Return the timed plan that another planner found for a lowest level that was exported with times.
+
+    The begins and ends of the steps keep their order; their times are calculated anew. External events are added at their times.
+
+    Parameters
+    ----------
+    problem : Problem
+    exported : Exported
+        The export of the problem with times.
+    text : str
+        A line ``begin: (action object …) [duration]`` for each step.
+    seconds : float, optional
+        Time limit of the schedule.
+
+    Raises
+    ------
+    KnowledgeError
+        A line isn't an action of the exported level, or has no begin or duration.
+    """
+    found = [(line.behavior, line.arguments, line.begin, line.duration) for line in _lines(exported, text)]
+    if lacking := next((one for one in found if one[2] is None or one[3] is None), None):
+        raise KnowledgeError(
+            f"a step of {lacking[0]} has no begin or no duration; wanted 'begin: (action object …) [duration]'"
+        )
+    last = max(((begin or 0) + (lasts or 0) for _, _, begin, lasts in found), default=Fraction(0))
+    events = problem.times.events.items() if problem.times else ()
+    found += [(name, (), at, Fraction(0)) for name, at in events if at <= last]
+    found.sort(key=lambda one: one[2] or 0)
+    level = problem.domain.levels[-1]
+    steps = _steps(problem, level, [(behavior, arguments) for behavior, arguments, _, _ in found])
+    order = []  # of simultaneous ends, that of the step that began last comes first; of simultaneous begins, that of the longest
+    for number, (_, _, begin, lasts) in enumerate(found):
+        assert begin is not None and lasts is not None
+        order.append((begin, 1, -lasts, number, EventKind.BEGIN))
+        order.append((begin + lasts, 2 if not lasts else 0, -begin, number, EventKind.END))
+    its_events = [(number, kind) for *_, number, kind in sorted(order, key=lambda one: one[:4])]
+    return in_time(problem, Plan(steps), seconds, events=its_events)
+
+
+def _lines(exported: Exported, text: str) -> list[PlanLine]:
+    try:
+        return plan_of(exported, text)
+    except ValueError as error:
+        raise KnowledgeError(str(error)) from error
+
+
+def _steps(problem: Problem, level: int, found: Sequence[Ground]) -> tuple[Step, ...]:
+    """Return steps with the values of their variables, as long as the steps are applicable in sequence."""
     model = Model(problem)
     values: Values | None = model.values(problem.initial)
     steps = []
@@ -150,7 +221,7 @@ def read_pddl_plan(
         applied = model.apply(GroundBehavior(number, behavior, arguments), values) if values is not None else None
         steps.append(Step((i,), number, level, behavior, arguments, applied.bindings if applied else {}))
         values = applied.after if applied else None
-    return Plan(tuple(steps))
+    return tuple(steps)
 
 
 def _regrouped(problem: Problem, level: int, plan: list[Ground], shorten: bool) -> list[Ground]:

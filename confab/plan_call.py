@@ -44,6 +44,7 @@ from confab.reasoner.refining import never_done, without
 from confab.reasoner.symbols import Behavior, Fact, GroundBehavior
 from confab.timing import (
     asks_for_times,
+    has_times,
     needs_others_meanwhile,
     scheduled,
     with_unit_costs,
@@ -172,9 +173,18 @@ def plan_task(task: PlanningTask) -> Found:
     if faulty and part is not None:  # an individual that wasn't read may have the value
         problem, part = task.whole(), None
         faulty = [*never_done(problem)]
+    if task.options.by_engine and has_times(problem) and not problem.weights:
+        from confab.engines import plan_in_time_by_engine, plans_in_time
+
+        if task.options.engine is not None and plans_in_time(task.options.engine):
+            problem = task.with_measured_durations(problem if task.reading.whole else task.whole())
+            outcome = plan_in_time_by_engine(problem, task.options.engine, task.deadline.left)
+            return Found(problem, outcome, schedule_of(outcome), None, False)
     if needs_others_meanwhile(problem):
         if task.options.by_engine:
-            raise KnowledgeError("the steps of this task must overlap, which engines don't plan; leave out the engine")
+            raise KnowledgeError(
+                "the steps of this task must overlap, which this engine doesn't plan; leave out the engine, or name another one"
+            )
         if problem.weights:
             raise KnowledgeError("a task whose steps must overlap can't have soft goals; drop the :weight of its goals")
         problem = task.with_measured_durations(problem if task.reading.whole else task.whole())

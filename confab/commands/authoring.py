@@ -279,15 +279,12 @@ def export(
         if trees:
             paths = _exported_trees(load_scene(scene), plan, goal, out)
         else:
-            from confab.pddl_commands import export_pddl
-            from confab.timing import has_times
+            from confab.pddl_commands import export_pddl, omitted_times
 
             problem = load_scene(scene).problem
             paths = export_pddl(problem, level, out)
-            if has_times(problem):
-                events = problem.times.events if problem.times else {}
-                some = "".join(f"; the external event {one} becomes an action without a time" for one in events)
-                remark(f"the PDDL has no durations, deadlines or windows of availability{some}")
+            if omitted := omitted_times(problem, level):
+                remark(omitted)
     for path in paths:
         print(path)
 

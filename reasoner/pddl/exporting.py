@@ -8,14 +8,17 @@ is boolean, its value. `confab.reasoner.pddl.lowering` describes the translation
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from itertools import chain
+from typing import NamedTuple
 
 from confab.reasoner.amounts import written
 from confab.reasoner.graph.knowledge import KnowledgeError
 from confab.reasoner.limits import checked
 from confab.reasoner.names import local_name
+from confab.reasoner.pddl.durative_actions import DurativeAction, TimedExport, literal_text
 from confab.reasoner.pddl.formulas import (
     TRUE,
     Assignment,
@@ -61,7 +64,7 @@ class Exported:
     objects: Mapping[str, str]
 
 
-def to_pddl(problem: Problem, level: int | None = None) -> Exported:
+def to_pddl(problem: Problem, level: int | None = None, workers: Collection[str] | None = None) -> Exported:
     """Return one level of a problem as a PDDL domain and a PDDL problem.
 
     Parameters
@@ -69,27 +72,44 @@ def to_pddl(problem: Problem, level: int | None = None) -> Exported:
     problem : Problem
     level : int, optional
         The level whose behaviours become actions; by default the lowest level.
+    workers : collection of individuals, optional
+        The individuals that are actors if no behaviour names its actors. If they are given, behaviours of the lowest level become
+        durative actions (`confab.reasoner.pddl.durative_actions`); without them, the export has no times.
 
     Raises
     ------
     KnowledgeError
-        A behaviour gives a symbol a value only during its execution, and the goal or another behaviour may require this value.
-        Or an amount has an initial value without a finite decimal notation.
+        An export without times: a behaviour gives a symbol a value only during its execution, and the goal or another behaviour may
+        require this value. An export with times: an external event depends on the state. Any export: an amount has an initial value
+        without a finite decimal notation.
     """
-    if names := sorted(only_during(problem)):
+    if workers is None and (names := sorted(only_during(problem))):
         raise KnowledgeError(
             f"{names[0]} gives a value only while it lasts, which classical PDDL can't say; such scenes are planned here only"
         )
     level = problem.domain.levels[-1] if level is None else level
-    return _Export(replace(problem, goal=problem.goal_on(level)), level).exported()
+    return _Export(replace(problem, goal=problem.goal_on(level)), level, workers).exported()
 
 
-def plan_of(exported: Exported, text: str) -> list[tuple[str, tuple[str, ...]]]:
-    """Return the steps of a plan in the competition format: one ``(action object …)`` per line, with comments after ``;``.
+class PlanLine(NamedTuple):
+    """A step of a plan: its begin and its duration in seconds, which are None in a plan without times."""
 
-    Returns
-    -------
-    list of (behaviour, arguments)
+    behavior: str
+    arguments: tuple[str, ...]
+    begin: Fraction | None
+    duration: Fraction | None
+
+
+STEP = re.compile(
+    r"\s*(?:(?P<begin>[\d.]+)\s*:)?\s*\(?(?P<words>[^()\[\]:]*)\)?\s*(?:\[\s*(?:d:)?\s*(?P<duration>[\d.]+)[^\]]*\])?\s*"
+)
+"""A line of a plan in the competition format."""
+
+
+def plan_of(exported: Exported, text: str) -> list[PlanLine]:
+    """Return the steps of a plan in the competition format, one per line, with comments after ``;``.
+
+    A step is ``(action object …)``, or ``begin: (action object …) [duration]`` in a plan with times.
 
     Raises
     ------
@@ -98,7 +118,9 @@ def plan_of(exported: Exported, text: str) -> list[tuple[str, tuple[str, ...]]]:
     """
     steps = []
     for number, line in enumerate(text.splitlines(), start=1):
-        words = re.sub(r"^\s*[\d.]+\s*:", "", line.split(";")[0]).strip().strip("()").lower().split()
+        said = line.split(";")[0].lower()
+        found = STEP.fullmatch(said)
+        words = (said if found is None else found["words"]).split()
         if not words:
             continue
         if words[0] not in exported.actions:
@@ -109,20 +131,29 @@ def plan_of(exported: Exported, text: str) -> list[tuple[str, tuple[str, ...]]]:
             raise ValueError(
                 f"line {number}: {'no object ' + unknown[0] if unknown else 'too few objects'}: {line.strip()}"
             )
-        steps.append((behavior, tuple(exported.objects[words[1 + place]] for place in places)))
+        begin, duration = (
+            None if found is None or found[one] is None else Fraction(found[one]) for one in ("begin", "duration")
+        )
+        steps.append(PlanLine(behavior, tuple(exported.objects[words[1 + place]] for place in places), begin, duration))
     return steps
 
 
 class _Export:
     """Intermediate results of the export of one level of a problem."""
 
-    def __init__(self, problem: Problem, level: int) -> None:
+    def __init__(self, problem: Problem, level: int, workers: Collection[str] | None = None) -> None:
         self.problem, self.words = problem, PddlNames(problem)
-        self.lowering = Lowering(problem, problem.domain.at_level(level), self.words)
+        behaviors = problem.domain.at_level(level)
+        self.timed = None if workers is None else TimedExport(problem, behaviors, self.words, workers)
+        self.lowering = Lowering(problem, behaviors, self.words) if self.timed is None else self.timed.lowering
+        made: Iterable[LoweredAction | DurativeAction]
+        if self.timed is None:
+            made = (action for action in map(self.lowering.action, self.lowering.cases) if action is not None)
+        else:
+            made = self.timed.actions()
         self.actions = {
             self.words.name("action", f"{number} {action.behavior.name}", action.behavior.name): action
-            for number, action in enumerate(map(self.lowering.action, self.lowering.cases))
-            if action is not None
+            for number, action in enumerate(made)
         }
         self.derived = list(self.lowering.derived()) if self.lowering.recursive else []
         hard = [(symbol, value) for symbol, value in problem.goal.items() if symbol not in problem.weights]
@@ -141,10 +172,13 @@ class _Export:
                 ways = [(symbol, rest), *((goal, problem.goal[goal]) for goal in soft)]
                 wanted.append(either(self.lowering.goal(*way) for way in ways))
         self.goal = both([*wanted, *self.lowering.within_bounds(ActionScope({}))])
-        self.facts = [*checked(chain(self.lowering.kept.facts(), self.words.facts()), EXPORTING)]
+        self.literals = [] if self.timed is None else sorted(self.timed.literals())
+        timed = () if self.timed is None else self.timed.facts()
+        self.facts = [*checked(chain(timed, self.lowering.kept.facts(), self.words.facts()), EXPORTING)]
         self.formulas = [*(action.needs for action in self.actions.values()), *(holds for _, _, holds in self.derived)]
         self.changes = [change for action in self.actions.values() for change in action.changes]
-        self.costs = any(action.cost != 1 for action in self.actions.values()) or bool(self.preferences)
+        costly = any(action.cost != 1 for action in self.actions.values()) or bool(self.preferences)
+        self.costs = costly and self.timed is None
 
     def exported(self) -> Exported:
         """Return the texts of the domain and the problem, with the mapping of PDDL names to the scene's names."""
@@ -191,20 +225,16 @@ class _Export:
             ":action-costs": self.costs,
             ":preferences": bool(self.preferences),
             ":numeric-fluents": numeric,
+            ":durative-actions": self.timed is not None,
+            ":timed-initial-literals": bool(self.literals),
         }
         return " ".join([":strips", ":typing", *(key for key, needed in wanted.items() if needed)])
 
     def domain_text(self, name: str, constants: Sequence[str]) -> str:
         """Return the text of the PDDL domain."""
         types = [f"{kind} - {above}" for kind, above in self.words.above.items()]
-        predicates = [
-            f"({' '.join([name, *(f'?x{i}' for i in range(arity))])})"
-            for name, arity in sorted(self.words.arity.items())
-        ]
-        functions = [
-            f"({' '.join([name, *(f'?x{i} - {self.words.common(types)}' for i, types in enumerate(kinds))])}) - number"
-            for name, kinds in sorted(self.words.functions.items())
-        ]
+        predicates = [self.declaration(*one) for one in sorted(self.words.predicates.items())]
+        functions = [f"{self.declaration(*one)} - number" for one in sorted(self.words.functions.items())]
         functions += ["(total-cost) - number"] * self.costs
         sections = [(":types", types), (":constants", list(map(self.words.declared, constants)))]
         sections += [(":predicates", predicates), (":functions", functions)]
@@ -216,8 +246,14 @@ class _Export:
         body = "\n".join([*rules, *(self.action_text(name, action) for name, action in self.actions.items())])
         return f"(define (domain {name})\n  (:requirements {self.requirements()})\n{head}{body})\n"
 
-    def action_text(self, name: str, action: LoweredAction) -> str:
+    def declaration(self, name: str, kinds: Sequence[Collection[str]]) -> str:
+        """Return the declaration of a predicate or function with the types of its arguments."""
+        return f"({' '.join([name, *(f'?x{i} - {self.words.common(types)}' for i, types in enumerate(kinds))])})"
+
+    def action_text(self, name: str, action: LoweredAction | DurativeAction) -> str:
         """Return the PDDL text of an action."""
+        if isinstance(action, DurativeAction):
+            return action.text(name)
         made = {(change.what, change.when, change.variables) for change in action.changes}
         changes = [
             change
@@ -245,9 +281,11 @@ class _Export:
             if "/" in number:
                 raise KnowledgeError(f"{what} is {number} initially, which no decimal number of PDDL states exactly")
             facts.append(f"(= {what} {number})")
+        facts += [literal_text(at, text) for at, text in self.literals]
         unmet = "".join(f" (* {number_text(weight)} (is-violated {name}))" for name, weight, _ in self.preferences)
-        cost = f"(+ (total-cost){unmet})" if unmet else "(total-cost)"
-        metric = f"  (:metric minimize {cost})\n" if self.costs else ""
+        total = "(total-cost)" if self.timed is None else "(total-time)"
+        cost = f"(+ {total}{unmet})" if unmet else total
+        metric = f"  (:metric minimize {cost})\n" if self.costs or self.timed is not None else ""
         name = self.words.name("problem", local_name(self.problem.scene))
         soft = [f"(preference {name} {formula_text(one)})" for name, _, one in self.preferences]
         goals = LINE.join([*map(formula_text, conjuncts(self.goal)), *soft])

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import chain, combinations, islice
@@ -313,12 +313,19 @@ class Lowering:
 
     def action(self, behavior: Behavior) -> LoweredAction | None:
         """Return the PDDL action of a behaviour; return None if the behaviour is never applicable or has no effect."""
+        found = self.lowered(behavior)
+        possible = found.needs != NEVER and all(term.members for term in found.parameters)
+        return found if possible and found.changes else None
+
+    def lowered(self, behavior: Behavior, taken: Collection[str] = ()) -> LoweredAction:
+        """Return the PDDL action of a behaviour, whose additional parameters have none of the names in `taken`."""
         scope, terms = ActionScope(behavior.kinds), dict[str, PddlTerm]()
         used = set[str]().union(*map(named, behavior.preconditions), terms_of(behavior.price or Fraction(0)))
         for one in (*behavior.parameters, *(v for v in behavior.variables if v.name in used)):
             terms[one.name] = self.words.variable(scope.fresh(one.name), one.kind)
             scope.parameters.append(terms[one.name])
             scope.needs.append(self.words.guard(terms[one.name], one.kind))
+        scope.names.update(taken)
         for condition in behavior.asked:
             match condition:
                 case ValueCondition(situation, arguments, value, False) if not self.words.situations[situation].boolean:
@@ -336,8 +343,6 @@ class Lowering:
             self.not_negative(behavior.timing.duration, terms, scope)
         changes = [*self.value_changes(behavior, terms, scope), *self.amount_changes(behavior, terms, scope)]
         needs = both([*scope.needs, *self.within_bounds(scope)])
-        if needs == NEVER or not changes or not all(term.members for term in scope.parameters):
-            return None
         names = [term.name for term in scope.parameters]
         places = tuple(names.index(terms[p.name].name) for p in behavior.parameters)
         return LoweredAction(behavior, tuple(scope.parameters), places, needs, tuple(changes), cost)

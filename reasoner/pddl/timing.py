@@ -29,7 +29,7 @@ from confab.reasoner.symbols import (
 from confab.reasoner.symbols import Effect as AnyEffect
 
 SPANS = {"start": Span.START, "all": Span.THROUGHOUT, "end": Span.END}
-MOMENT, PASSED = "Moment", "passed"
+MOMENT, PASSED = "Moment", "Passed"  # no names of PDDL, which have no capital letters
 
 
 class QuantifiedVariables(Protocol):

@@ -51,7 +51,7 @@ class PddlNames:
         self.taken = set(RESERVED.split())
         self.used: dict[str, None] = {}  # situation types that have become predicates
         self.statics: dict[str, frozenset[tuple[str, ...]]] = {}  # rows of each static predicate
-        self.arity: dict[str, int] = {}
+        self.predicates: dict[str, list[set[str]]] = {}  # types of the terms at each argument position
         self.functions: dict[str, list[set[str]]] = {}  # types of the terms at each argument position
         self.measured: dict[str, str] = {}  # function of each relation whose last argument is a number
         self.counted: dict[str, str] = {}  # function of each situation type that is an amount
@@ -118,8 +118,9 @@ class PddlNames:
     # ----------------------------------------------------------------------------------------------------- predicates
 
     def atom(self, predicate: str, terms: Sequence[PddlTerm]) -> Atom:
-        """Return an atom, and record the predicate's number of arguments."""
-        self.arity[predicate] = len(terms)
+        """Return an atom, and record the types of its arguments."""
+        for types, term in zip(self.predicates.setdefault(predicate, [set() for _ in terms]), terms, strict=True):
+            types.add(term.type)
         return Atom(predicate, tuple(terms))
 
     def about(self, situation: str, terms: Sequence[PddlTerm]) -> tuple[PddlTerm, ...]:

@@ -216,7 +216,7 @@ def test_a_plan_that_an_engine_has_written_by_its_limit_counts() -> None:
     pytest.importorskip("unified_planning", reason="needs the extra 'pddl'")
     files = "printf '(a x)\\n(b y)\\n' > plan.1; sleep 0.01; printf '(a' > plan.2; printf '1 2' > plan_numbers; sleep 9"
     slow = SimpleNamespace(_get_cmd=lambda *_: ["sh", "-c", files])
-    assert engines._directly(slow, "", "", Deadline.after(0.5)) == ("SOLVED_SATISFICING", ["a x", "b y"])
+    assert engines._directly(slow, "", "", Deadline.after(0.5)) == ("SOLVED_SATISFICING", ["(a x)", "(b y)"])
 
 
 def test_the_used_engine_is_logged_with_its_time_limit(

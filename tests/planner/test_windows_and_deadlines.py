@@ -26,7 +26,7 @@ from confab.reasoner.pddl.importing import imported
 from confab.reasoner.pddl.syntax import parse
 from confab.reasoner.pddl.turtle import turtle
 from confab.reasoner.problem import Problem
-from confab.reasoner.symbols import Symbol, Times
+from confab.reasoner.symbols import Symbol
 from confab.timing import Minimise
 from tests.reasoner.test_durative import TRUCK, WAY
 from worlds.families import family
@@ -399,22 +399,25 @@ def test_a_battery_is_charged_before_it_is_empty_if_the_charger_is_available_onl
     assert charge.end <= 10
 
 
-def test_an_export_says_that_pddl_has_no_times(tmp_path: Path) -> None:
+def test_an_export_says_which_times_it_lacks(tmp_path: Path) -> None:
     (tmp_path / "robots.ttl").write_text(ROBOTS, "utf-8")
     done = CliRunner().invoke(app, ["export", str(tmp_path / "robots.ttl"), "-o", str(tmp_path / "pddl")])
-    assert "the PDDL has no durations, deadlines or windows of availability" in done.stderr
+    assert done.exit_code == 0 and done.stderr == ""
+    bakery = Path(__file__).parents[2] / "docs/examples/bakery/bakery.ttl"
+    done = CliRunner().invoke(app, ["export", str(bakery), "-o", str(tmp_path / "bakery")])
+    assert "the PDDL has no deadlines" in done.stderr
+    done = CliRunner().invoke(app, ["export", str(bakery), "--level", "1", "-o", str(tmp_path / "upper")])
+    assert "the PDDL of an upper level has no durations, deadlines or windows of availability" in done.stderr
     done = CliRunner().invoke(app, ["export", "house-small", "-o", str(tmp_path / "house")])
     assert done.stderr == ""
 
 
-def test_an_export_names_the_external_events_that_become_actions(tmp_path: Path) -> None:
+def test_external_events_of_an_export_happen_at_their_times(tmp_path: Path) -> None:
     problem = imported(parse(TRUCK, WAY)).problem
     (tmp_path / "way.ttl").write_text(turtle(problem, "title", "description"), "utf-8")
-    events = list((confab.load(tmp_path / "way.ttl").problem.times or Times()).events)
     done = CliRunner().invoke(app, ["export", str(tmp_path / "way.ttl"), "-o", str(tmp_path / "pddl")])
-    assert events
-    for event in events:
-        assert f"the external event {event} becomes an action without a time" in done.stderr
+    assert done.exit_code == 0 and done.stderr == ""
+    assert "(at 10 (open y))" in (tmp_path / "pddl/problem.pddl").read_text()
 
 
 CUPS = """

@@ -138,7 +138,7 @@ def assert_same_behaviour(first: Problem, exported: Exported, second: Imported, 
                     found[name, arguments] = operator
                 else:
                     (step,) = plan_of(exported, second.line(name, arguments))
-                    found[step] = operator
+                    found[step.behavior, step.arguments] = operator
         return found
 
     choice = random.Random(0)
