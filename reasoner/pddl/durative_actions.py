@@ -126,7 +126,7 @@ class DurativeAction:
 
 
 @dataclass(frozen=True)
-class Parts:
+class TimedParts:
     """The parts of a behaviour in time.
 
     `begin` has the effects at the start, `pending` those throughout, and `end` those at the end. `held` has only the conditions
@@ -144,7 +144,7 @@ class Parts:
         yield from (self.begin, self.pending, self.held, self.end)
 
 
-def parts_of(problem: Problem, behavior: Behavior) -> Parts:
+def parts_of(problem: Problem, behavior: Behavior) -> TimedParts:
     """Return the parts of a behaviour; their parameters include the variables that the preconditions determine."""
     timing, own = timing_of(behavior), with_fixed(behavior)
 
@@ -170,7 +170,7 @@ def parts_of(problem: Problem, behavior: Behavior) -> Parts:
     unread = [one for one in passing if _is_unread(problem, one)]
     moved = [one for one in timing.made(Span.END) if any(_same(one, other) for other in unread)]
     meanwhile = [ValueCondition(e.situation, e.arguments, e.value) for e in passing if e not in unread]
-    return Parts(
+    return TimedParts(
         behavior,
         part("start", before, [e for e in timing.made(Span.START) if not any(_same(e, one) for one in moved)]),
         part("pending", before, [*timing.made(Span.THROUGHOUT), *moved]),
@@ -266,7 +266,7 @@ class TimedExport:
                 if found is not None:
                     yield found
 
-    def action(self, parts: Parts) -> DurativeAction | None:
+    def action(self, parts: TimedParts) -> DurativeAction | None:
         """Return the durative action of a behaviour, or None if the behaviour is never applicable or has no effect."""
         lowered, taken = list[LoweredAction](), set[str]()
         for part in parts:

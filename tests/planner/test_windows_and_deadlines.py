@@ -406,7 +406,8 @@ def test_an_export_says_which_times_it_lacks(tmp_path: Path) -> None:
     bakery = Path(__file__).parents[2] / "docs/examples/bakery/bakery.ttl"
     done = CliRunner().invoke(app, ["export", str(bakery), "-o", str(tmp_path / "bakery")])
     assert "the PDDL has no deadlines" in done.stderr
-    done = CliRunner().invoke(app, ["export", str(bakery), "--level", "1", "-o", str(tmp_path / "upper")])
+    levels = Path(__file__).parent / "cases/ovens-in-levels.ttl"
+    done = CliRunner().invoke(app, ["export", str(levels), "--level", "1", "-o", str(tmp_path / "upper")])
     assert "the PDDL of an upper level has no durations, deadlines or windows of availability" in done.stderr
     done = CliRunner().invoke(app, ["export", "house-small", "-o", str(tmp_path / "house")])
     assert done.stderr == ""

@@ -25,6 +25,8 @@ from confab.reasoner.symbols import Times
 from tests.reasoner.test_durative import BAKERY, CELLAR, FUSES, TRUCK, WAY, loaves
 from worlds.timed import problem_of, timed_world
 
+APART = Fraction(1, 1000)
+"""The time between the begins of two steps, since the validator requires conflicting events at different times."""
 OVENS = "s - short l - long"
 TASKS = {"cellar": (CELLAR, FUSES), "truck": (TRUCK, WAY), "bakery": (BAKERY, loaves(4, OVENS))}
 
@@ -92,20 +94,23 @@ def test_plans_of_exported_random_worlds_are_plans_of_these_worlds(seed: int, ki
 @pytest.mark.parametrize("name", ["cellar", "bakery"])
 def test_the_validator_of_unified_planning_accepts_plans_of_the_export(name: str, tmp_path: Path) -> None:
     pytest.importorskip("unified_planning")
-    from benchmarks.temporal import validated
+    from unified_planning.engines.plan_validator import TimeTriggeredPlanValidator
+    from unified_planning.io import PDDLReader
+    from unified_planning.shortcuts import get_environment
 
+    get_environment().credits_stream = None
     out = exported(imported(parse(*TASKS[name])).problem)
     again = imported(parse(out.domain, out.problem))
     timed = planned(again.problem)
     assert timed is not None
-    (tmp_path / "domain.pddl").write_text(out.domain)
-    (tmp_path / "problem.pddl").write_text(out.problem)
-    apart = Fraction(1, 1000)  # the validator requires conflicting events at different times
-    steps = [
-        (slot.begin + number * apart, again.line(slot.step.behavior, slot.step.arguments), slot.end - slot.begin)
-        for number, slot in enumerate(sorted(timed.slots, key=lambda slot: slot.begin))
-    ]
-    assert validated(tmp_path / "domain.pddl", tmp_path / "problem.pddl", steps)
+    slots = sorted(timed.slots, key=lambda slot: slot.begin)
+    apart = [replace(one, begin=one.begin + n * APART, end=one.end + n * APART) for n, one in enumerate(slots)]
+    files = [tmp_path / "domain.pddl", tmp_path / "problem.pddl"]
+    files[0].write_text(out.domain)
+    files[1].write_text(out.problem)
+    read = PDDLReader().parse_problem(*map(str, files))
+    plan = PDDLReader().parse_plan_string(read, lines(again, replace(timed, slots=tuple(apart))))
+    assert TimeTriggeredPlanValidator().validate(read, plan)
 
 
 def test_an_actor_is_busy_from_start_to_end_and_a_default_actor_is_a_worker() -> None:
