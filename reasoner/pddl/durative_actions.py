@@ -282,8 +282,8 @@ class TimedExport:
         duration, lasting = self.duration(parts.behavior, terms)
         still = conjuncts(held.needs)
         conditions = [(START, one) for one in (*conjuncts(begin.needs), *conjuncts(pending.needs), *lasting)]
-        conditions += [(ALL, one) for one in still if not self.static(one)]
-        conditions += [(END, one) for one in conjuncts(end.needs) if one not in still and not self.static(one)]
+        conditions += [(START if self.static(one) else ALL, one) for one in still]
+        conditions += [(START if self.static(one) else END, one) for one in conjuncts(end.needs) if one not in still]
         effects = [TimedEffect(START, START, change) for change in begin.changes]
         for change in pending.changes:
             effects.append(TimedEffect(START, START if isinstance(change.what, Not) else END, change))

@@ -67,6 +67,11 @@ def test_external_events_become_timed_initial_literals_and_calculated_durations_
     assert "(= ?duration (/ (length ?p ?q) (speed ?t)))" in found.domain
 
 
+def test_a_condition_that_nothing_changes_is_a_condition_at_the_start_whatever_its_time() -> None:
+    text = TRUCK.replace("(over all (road ?p ?q))", "(at end (road ?p ?q))")
+    assert "(at start (road ?p ?q))" in exported(imported(parse(text, WAY)).problem).domain
+
+
 @pytest.mark.parametrize("name", TASKS)
 def test_an_export_that_is_imported_again_has_plans_with_the_same_makespan(name: str) -> None:
     first = imported(parse(*TASKS[name])).problem
