@@ -34,7 +34,8 @@ def ordered(task: Task, deadline: float | None = None) -> Task:
     If the computation takes too much work, or the deadline (on the clock of `time.perf_counter`) has passed, return the same task.
     """
     goals = task.goal & ~task.initial & _plain(task)
-    if goals.bit_count() < 2 or ROUNDS * len(task.needs.items) > MOST_WORK:
+    pairs = _plain(task).bit_count() ** 2 // 2
+    if goals.bit_count() < 2 or max(pairs, ROUNDS * len(task.needs.items)) > MOST_WORK:
         return task
     for operator in range(len(task)):
         if operator % LOOK == 0 and deadline is not None and perf_counter() > deadline:
@@ -95,6 +96,8 @@ def _compatible(task: Task, deadline: float | None) -> Sequence[int] | None:
                     if new:
                         changed = True
                         most -= new.bit_count()
+                        if most < 0:
+                            return None
                         together[bit] |= new
                         mine = 1 << bit
                         for other in bits_of(new):
