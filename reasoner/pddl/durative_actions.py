@@ -189,7 +189,8 @@ def _passing(problem: Problem, behavior: Behavior) -> Iterator[ValueEffect]:
     for one in timing.made(Span.START):
         if isinstance(one, AmountEffect) or one.when or one.each or problem.domain.situations[one.situation].boolean:
             continue
-        if any(_same(one, last) and not last.when for last in timing.made(Span.END)):
+        again = [last for last in timing.made(Span.END) if _same(one, last)]
+        if again and not any(last.when or last.each for last in again):
             yield one
 
 

@@ -100,10 +100,11 @@ class PlanLine(NamedTuple):
     duration: Fraction | None
 
 
+NUMBER = r"(?:\d+\.?\d*|\.\d+)"
 STEP = re.compile(
-    r"\s*(?:(?P<begin>[\d.]+)\s*:)?\s*\(?(?P<words>[^()\[\]:]*)\)?\s*(?:\[\s*(?:d:)?\s*(?P<duration>[\d.]+)[^\]]*\])?\s*"
+    rf"(?:(?P<begin>{NUMBER}) ?: ?)?\(?(?P<words>[^()\[\]:]*)\)? ?(?:\[ ?(?:d: ?)?(?P<duration>{NUMBER})[^\]]*\]?)?"
 )
-"""A line of a plan in the competition format."""
+"""A line of a plan in the competition format, with single spaces; the comment may begin within ``[D:4; C:1]``."""
 
 
 def plan_of(exported: Exported, text: str) -> list[PlanLine]:
@@ -118,7 +119,7 @@ def plan_of(exported: Exported, text: str) -> list[PlanLine]:
     """
     steps = []
     for number, line in enumerate(text.splitlines(), start=1):
-        said = line.split(";")[0].lower()
+        said = " ".join(line.split(";")[0].lower().split())
         found = STEP.fullmatch(said)
         words = (said if found is None else found["words"]).split()
         if not words:

@@ -17,7 +17,7 @@ from confab.planner.timed.call import best_in_time
 from confab.planner.timed.pieces import default_actors
 from confab.planner.timed.plan import TimedPlan, schedule_of
 from confab.reasoner.graph.knowledge import KnowledgeError
-from confab.reasoner.pddl.exporting import Exported, to_pddl
+from confab.reasoner.pddl.exporting import Exported, plan_of, to_pddl
 from confab.reasoner.pddl.importing import Imported, imported
 from confab.reasoner.pddl.syntax import parse
 from confab.reasoner.problem import Problem
@@ -123,6 +123,18 @@ def test_an_actor_is_busy_from_start_to_end_and_a_default_actor_is_a_worker() ->
     text = " ".join(exported(scene.problem).domain.split())
     assert "(at start (idle ?left_hand))" not in text
     assert text.count("(at start (idle ?hand))") == text.count("(at end (idle ?hand))") > 0
+
+
+def test_lines_of_plans_are_read_with_and_without_times_and_bad_lines_are_named_at_once() -> None:
+    out = exported(imported(parse(TRUCK, WAY)).problem)
+    text = "; a comment\n  0.5 :  ( DRIVE  t x y )  [D:4.0; C:1]\n(drive u x y)\n"
+    assert [(line.arguments, line.begin, line.duration) for line in plan_of(out, text)] == [
+        (("t", "x", "y"), Fraction(1, 2), Fraction(4)),
+        (("u", "x", "y"), None, None),
+    ]
+    for bad in ("1.2.3: (drive t x y) [4]", " " * 100_000 + "]", "0: (drive t x y) [4] [5]", "fly t"):
+        with pytest.raises(ValueError, match="line 2: no action"):
+            plan_of(out, f"(drive t x y)\n{bad}")
 
 
 def test_an_event_that_depends_on_the_state_is_no_timed_initial_literal() -> None:
