@@ -195,10 +195,10 @@ def read_timed_plan(problem: Problem, exported: Exported, text: str, seconds: fl
     found.sort(key=lambda one: one[2] or 0)
     level = problem.domain.levels[-1]
     steps = _steps(problem, level, [(behavior, arguments) for behavior, arguments, _, _ in found])
-    order = []  # of simultaneous ends, that of the step that began last comes first; of simultaneous begins, that of the longest
+    order = []  # of simultaneous ends, that of the step that began last comes first
     for number, (_, _, begin, lasts) in enumerate(found):
         assert begin is not None and lasts is not None
-        order.append((begin, 1, -lasts, number, EventKind.BEGIN))
+        order.append((begin, 1, Fraction(number), number, EventKind.BEGIN))
         order.append((begin + lasts, 2 if not lasts else 0, -begin, number, EventKind.END))
     its_events = [(number, kind) for *_, number, kind in sorted(order, key=lambda one: one[:4])]
     return in_time(problem, Plan(steps), seconds, events=its_events)
